@@ -74,6 +74,7 @@ EXTRAS = {
     "floatbase/lessons/publish/site": "site",
     "tests": "test",
     "benchmarks": "test",
+    "examples": "test",
     ".ci": "test",
     "assets": "test",
 }

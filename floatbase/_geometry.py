@@ -56,9 +56,8 @@ def distance_to_polygon(points: Array, polygon: Array) -> Array:
     from_corners = points[..., None, :] - polygon
     lengths = np.linalg.norm(edges, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
-    heights = (
-        edges[:, 0] * from_corners[..., 1] - edges[:, 1] * from_corners[..., 0]
-    ) / lengths  # of the points above the lines through the edges
+    # of the points above the lines through the edges
+    heights = (edges[:, 0] * from_corners[..., 1] - edges[:, 1] * from_corners[..., 0]) / lengths
     nearest = heights.min(axis=-1)
     inside = (nearest >= 0.0) & (len(polygon) > 2)
     if np.all(inside):

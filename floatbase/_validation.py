@@ -83,9 +83,8 @@ class Value:
             for name in vars(self)
             if isinstance(getattr(type(self), name, None), functools.cached_property)
         }
-        computed -= set(
-            getattr(self, "__dataclass_fields__", ())
-        )  # a field here, but computed by a base class
+        # a field here, but computed by a base class
+        computed -= set(getattr(self, "__dataclass_fields__", ()))
         kept = {name: value for name, value in vars(self).items() if name not in computed}
         return {
             name: dict(value) if isinstance(value, MappingProxyType) else value
@@ -333,9 +332,8 @@ def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:
     With `k` = None, any number of forces is accepted.
     """
     array = numeric_copy(forces)
-    one_row_per_point = (
-        array is not None and array.ndim == 2 and array.shape[1] == 3
-    )  # shape (3, k / 3) has another order
+    # shape (3, k / 3) has another order
+    one_row_per_point = array is not None and array.ndim == 2 and array.shape[1] == 3
     return as_array(
         name, array.ravel() if array is not None and one_row_per_point else forces, (k,), "N"
     )

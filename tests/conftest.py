@@ -16,6 +16,7 @@ import hypothesis
 import numpy as np
 import psutil
 import pytest
+from costs import Costs
 
 # What takes longest is started first, so that no worker is left alone with it at the end:
 # each lesson by itself, and these files as a whole.
@@ -58,6 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["FLOATBASE_HOME"] = tempfile.mkdtemp(
         prefix="home-"
     )  # a learner's progress is not the tests' to write
+    config.pluginmanager.register(Costs(is_worker=not is_no_worker(config)))
     shift_seeds(config, config.getoption("--seed"))
 
 

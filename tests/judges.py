@@ -41,13 +41,18 @@ FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
 FLAT = tuple(
     name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet)
 )
-every_robot = pytest.fixture(params=ROBOTS)(
-    lambda request: request.param
-)  # `name = judges.every_robot` runs a file on each
+# `name = judges.every_robot` runs a file on each
+every_robot = pytest.fixture(params=ROBOTS)(lambda request: request.param)
 every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: request.param)
 # one of each kind: point feet with enough torques and with too few, flat feet, bolted down
 KINDS = ("go2", "solo8", "talos", "ur5")
 BALLS = tuple(name for name in FLOATING if name not in FLAT)
+
+
+def sampled(names: Iterable[str], *kept: str) -> list[object]:
+    """Names as parameters of a test, those that are not kept in `make test-all` only."""
+    later = pytest.mark.front_end
+    return [name if name in kept else pytest.param(name, marks=later) for name in names]
 
 
 def states(name: str, n: int, spread: float = 0.3) -> list[State]:
@@ -110,6 +115,13 @@ def difference(
         "the compiled tick left this state to the reference backend"
     )
     return float(np.max(np.abs(found.tau - expected.tau)))
+
+
+def largest_difference(
+    both: tuple[fb.WholeBodyController, fb.WholeBodyController], at: list[State], t: float = 0.0
+) -> float:
+    """Largest `difference` [N·m] at these states."""
+    return max(difference(*both, state, t) for state in at)
 
 
 def agreement(robot: Robot) -> float:

@@ -13,9 +13,8 @@ import pinocchio as pin
 
 import floatbase as fb
 from floatbase.behaviours import Walk
-from floatbase.behaviours._page import controllers
 from floatbase.control.tick import tick
-from floatbase.lessons.publish.live import robots
+from floatbase.live import robots
 from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
 
 STATES_PER_ROBOT = 200
@@ -127,7 +126,7 @@ def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[
     sim.reset(standing)
     assumed = _with_payload(robot, given.get("payload", 0.0))
     made = robots.controller(
-        assumed, given.get("mu", robots.MU), mismatch=None if mismatch.is_exact else mismatch
+        assumed, given.get("mu", robots.MU), modify_qp=None if mismatch.is_exact else mismatch
     )
     made = made.replace(tasks=fb.standing_tasks(standing))
     push = fb.Push(force, PUSH_TIME, duration)
@@ -157,7 +156,7 @@ class _RecordedWalk:
                 walk.gait = replace(walk.gait, stop=t)
             walk.velocity, walk.yaw_rate = (settings[1], 0.0), settings[2]
         command = walk(q, v, t)
-        compiled = controllers(walk)[walk.stance].compiled
+        compiled = walk.controllers[walk.stance].compiled
         assert compiled is not None and command.backend == "compiled" and not command.softened
         inputs = compiled.user_terms.inputs(command.target_values, q, v, t).packed
         com = pin.centerOfMass(walk.robot.model, walk.robot.model.createData(), q)

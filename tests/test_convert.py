@@ -31,7 +31,7 @@ def converted(lesson: Path, to: str, *options: str) -> None:
     subprocess.run(command, check=True, capture_output=True, timeout=500)
 
 
-def test_every_picture_of_a_converted_lesson_is_there(tmp_path: Path, browser: Any) -> None:
+def test_every_picture_of_a_converted_lesson_is_there(tmp_path, browser):
     lesson = Path(shutil.copy(NOTEBOOKS / f"{NAME}.ipynb", tmp_path))
     converted(lesson, "notebook", "--execute", "--inplace")
     notebook = nbformat.read(lesson, 4)

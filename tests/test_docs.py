@@ -15,7 +15,7 @@ LINK = re.compile(r"\]\(((?!https?:)[^)#\s]+)")
 
 
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
-def test_the_code_of_a_page_runs_and_prints_what_the_page_shows(
+def test_the_code_of_a_page_prints_the_output_of_the_page(
     page: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -8,24 +8,17 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", "scipy.spatial")
 IMPORT_LIMIT = 0.5  # s of one core, which a busy machine does not change
 
 
-def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path: Path) -> None:
-    pip = [
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--quiet",
-        "--no-deps",
-        "--no-build-isolation",
-        "-w",
-        str(tmp_path),
-        str(ROOT),
-    ]
+@pytest.mark.front_end
+def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path):
+    options = ["-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w"]
+    pip = [sys.executable, *options, str(tmp_path), str(ROOT)]
     subprocess.run(pip, check=True, capture_output=True)
     (wheel,) = tmp_path.glob("floatbase-*.whl")
     packed = set(zipfile.ZipFile(wheel).namelist())
@@ -39,13 +32,11 @@ def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path
     built = {path.relative_to(ROOT).as_posix() for path in (web / "dist").iterdir()}
     assert built <= packed
     assert not [name for name in packed if "web/src/" in name or "node_modules" in name]
-    assert {name.split("/")[0] for name in packed} == {
-        "floatbase",
-        wheel.name.rsplit("-", 3)[0] + ".dist-info",
-    }
+    expected = {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
+    assert {name.split("/")[0] for name in packed} == expected
 
 
-def test_importing_floatbase_is_light_and_quick() -> None:
+def test_importing_floatbase_is_light_and_quick():
     code = (
         "import json, sys, time; start = time.process_time(); import floatbase; took = "
         "time.process_time() - start; "

@@ -34,7 +34,7 @@ with whole_file(Path(sys.argv[1])) as part:
 """
 
 
-def test_a_process_that_is_killed_leaves_the_former_file(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_leaves_the_former_file(tmp_path):
     target = tmp_path / "film.mp4"
     target.write_bytes(b"former")
     process = subprocess.Popen(
@@ -48,7 +48,7 @@ def test_a_process_that_is_killed_leaves_the_former_file(tmp_path: Path) -> None
     assert target.read_bytes() == b"new"
 
 
-def test_the_permissions_of_a_file_are_kept(tmp_path: Path) -> None:
+def test_the_permissions_of_a_file_are_kept(tmp_path):
     target = tmp_path / "answers.json"
     target.write_bytes(b"former")
     target.chmod(0o600)
@@ -57,7 +57,7 @@ def test_the_permissions_of_a_file_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("linked", [False, True])
-def test_a_pipe_is_written_and_not_replaced(linked: bool, tmp_path: Path) -> None:
+def test_a_pipe_is_written_and_not_replaced(linked, tmp_path):
     pipe, link = tmp_path / "pipe", tmp_path / "link"
     os.mkfifo(pipe)
     link.symlink_to(pipe)
@@ -69,7 +69,7 @@ def test_a_pipe_is_written_and_not_replaced(linked: bool, tmp_path: Path) -> Non
     assert received[0].startswith(b"file,name") and pipe.is_fifo() and link.is_symlink()
 
 
-def test_two_files_of_one_folder_can_be_written_at_once(tmp_path: Path) -> None:
+def test_two_files_of_one_folder_can_be_written_at_once(tmp_path):
     with whole_file(tmp_path / "a") as a, whole_file(tmp_path / "b") as b:
         a.write_text("a")
         b.write_text("b")
@@ -78,9 +78,7 @@ def test_two_files_of_one_folder_can_be_written_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("extension", [".png", ".gif", ".mp4", ".html"])
 @pytest.mark.parametrize("linked", [False, True])
-def test_a_picture_that_fails_leaves_all_other_files(
-    extension: str, linked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_picture_that_fails_leaves_all_other_files(extension, linked, tmp_path, monkeypatch):
     if extension == ".mp4":
         pytest.importorskip("av", reason="av writes films")
     target, other = tmp_path / f"run{extension}", tmp_path / f"run.part{extension}"
@@ -116,9 +114,7 @@ def test_a_picture_that_fails_leaves_all_other_files(
     assert {path.name for path in tmp_path.iterdir()} == {target.name, former.name, other.name}
 
 
-def test_a_table_that_cannot_be_written_leaves_the_former_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_that_cannot_be_written_leaves_the_former_one(tmp_path, monkeypatch):
     table = tmp_path / "marks.csv"
     write_table([], table)
     former = table.read_bytes()

@@ -1,6 +1,4 @@
-"""The form of the lessons: a question, a prediction, a cell that does not know the answer, why, and
-then the claims.
-"""
+"""The form of the lessons: question, prediction, computed answer, reason, claims."""
 
 from __future__ import annotations
 
@@ -32,6 +30,16 @@ def cells(path: Path) -> list[Any]:
 
 def tagged(cell: Any, tag: str) -> bool:
     return tag in cell.metadata.get("tags", [])
+
+
+def code(path: Path) -> list[Any]:
+    return [cell for cell in cells(path) if cell.cell_type == "code"]
+
+
+def asked(cell: Any) -> list[str]:
+    """Names of the questions that a text asks."""
+    found = QUESTION.findall(cell.source) if cell.cell_type == "markdown" else []
+    return [name.strip() for name in found]
 
 
 def calls(cell: Any, function: str) -> list[ast.Call]:
@@ -77,31 +85,19 @@ def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
 @LESSONS
 def test_predictions_are_named_in_order(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    asked = [
-        found
-        for cell in cells(path)
-        if cell.cell_type == "markdown"
-        for found in QUESTION.findall(cell.source)
-    ]
-    assert [name.strip() for name in asked] == [
-        f"{lesson}.{letter}" for letter in ascii_lowercase[: len(asked)]
-    ]
-    assert [name for _, name in named(path, "predict")] == [name.strip() for name in asked]
-    assert asked, "a lesson without a question"
+    names = [name for cell in cells(path) for name in asked(cell)]
+    assert names, "a lesson without a question"
+    assert names == [f"{lesson}.{letter}" for letter in ascii_lowercase[: len(names)]]
+    assert [name for _, name in named(path, "predict")] == names
 
 
 @LESSONS
-def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: Path) -> None:
+def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
-        asked = (
-            [name.strip() for name in QUESTION.findall(before.source)]
-            if before.cell_type == "markdown"
-            else []
-        )
         predicted = calls(cell, "predict")
-        if asked and not predicted:
-            wrong.append(f"{asked}: no predict(…) right below")
+        if asked(before) and not predicted:
+            wrong.append(f"{asked(before)}: no predict(…) right below")
         for call in predicted:
             name = ast.literal_eval(call.args[0])
             rest = [
@@ -110,7 +106,7 @@ def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: P
                 if not isinstance(line, ast.Import | ast.ImportFrom)
             ]
             fits = {
-                "the question right above": asked == [name],
+                "the question right above": asked(before) == [name],
                 "a cell of its own": len(rest) == 1,
                 "... as its answer": [ast.unparse(answer) for answer in call.args[1:]] == ["..."],
                 'the tag "predict"': tagged(cell, "predict"),
@@ -127,11 +123,9 @@ def test_every_question_has_its_cell_right_below_and_nothing_is_typed_in(path: P
 
 
 @LESSONS
-def test_every_prediction_is_compared_once_with_what_a_later_cell_computes(path: Path) -> None:
-    predicted, compared = (
-        dict(map(reversed, named(path, "predict"))),
-        dict(map(reversed, named(path, "compare"))),
-    )
+def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) -> None:
+    predicted = {name: i for i, name in named(path, "predict")}
+    compared = {name: i for i, name in named(path, "compare")}
     assert len(compared) == len(named(path, "compare"))
     assert sorted(compared) == sorted(predicted)
     assert [name for name, i in compared.items() if i <= predicted[name]] == []
@@ -145,7 +139,7 @@ def test_every_prediction_is_compared_once_with_what_a_later_cell_computes(path:
 
 
 @LESSONS
-def test_no_cell_between_a_prediction_and_its_why_knows_the_answer(path: Path) -> None:
+def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Path) -> None:
     wrong, predicting = [], ""
     for cell in cells(path):
         if cell.cell_type == "markdown":
@@ -158,11 +152,9 @@ def test_no_cell_between_a_prediction_and_its_why_knows_the_answer(path: Path) -
 
 
 @LESSONS
-def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: Path) -> None:
+def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
     wrong = []
-    for cell in cells(path):
-        if cell.cell_type != "code":
-            continue
+    for cell in code(path):
         body = ast.parse(cell.source).body
         fits = {
             "asserts outside of its claims": not asserts(cell)
@@ -182,20 +174,11 @@ def test_what_a_lesson_asserts_stands_in_folded_cells_that_print_nothing(path: P
 
 
 @LESSONS
-def test_code_fits_the_window_and_hides_no_minus_by_a_sum(path: Path) -> None:
-    lines = [
-        line
-        for cell in cells(path)
-        if cell.cell_type == "code"
-        for line in cell.source.splitlines()
-    ]
+def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    lines += [
-        line
-        for name, e in all_exercises().items()
-        if name.startswith(f"{lesson}.")
-        for line in e.solution.splitlines()
-    ]
+    sources = [cell.source for cell in code(path)]
+    sources += [e.solution for name, e in all_exercises().items() if name.startswith(f"{lesson}.")]
+    lines = "\n".join(sources).splitlines()
     assert [line for line in lines if len(line) > LONGEST] == []
     assert [line for line in lines if re.search(r"\+ 0\.0\b(?!\d)", line)] == []
 
@@ -203,20 +186,16 @@ def test_code_fits_the_window_and_hides_no_minus_by_a_sum(path: Path) -> None:
 @LESSONS
 def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
     lesson = path.stem.split("_")[0]
-    reviewed = [i for i, cell in enumerate(cells(path)) for call in calls(cell, "review")]
-    texts = [
-        [ast.unparse(part) for part in call.args]
-        for cell in cells(path)
-        for call in calls(cell, "review")
+    ((at, call),) = [
+        (i, call) for i, cell in enumerate(cells(path)) for call in calls(cell, "review")
     ]
-    assert texts == [[] if lesson == "00" else [repr(lesson)]]
-    assert reviewed[0] > max(i for i, _ in named(path, "compare"))
+    assert [ast.unparse(part) for part in call.args] == ([] if lesson == "00" else [repr(lesson)])
+    assert at > max(i for i, _ in named(path, "compare"))
 
 
 @LESSONS
-def test_a_lesson_with_lessons_before_it_begins_with_recall(path: Path) -> None:
-    code = [cell.source for cell in cells(path) if cell.cell_type == "code"]
-    recalls = [i for i, source in enumerate(code) if source.startswith("recall()")]
+def test_all_lessons_but_the_first_begin_with_recall(path: Path) -> None:
+    recalls = [i for i, cell in enumerate(code(path)) if cell.source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
 
 
@@ -226,7 +205,7 @@ def the_map() -> str:
 
 
 @LESSONS
-def test_an_equation_is_taught_where_it_is_written_out_with_its_number(path: Path) -> None:
+def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path: Path) -> None:
     for teaches, tags in taught(path):
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"

@@ -1,6 +1,4 @@
-"""The lessons as files: they run, print what is stored, leave nothing behind, and their exercises
-can be solved.
-"""
+"""The lessons as files: they print their stored outputs, and their exercises can be solved."""
 
 from __future__ import annotations
 
@@ -9,8 +7,6 @@ import contextlib
 import json
 import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,11 +15,11 @@ from typing import Any
 import nbformat
 import psutil
 import pytest
+from lesson_runs import MARK, LessonRunner
 from nbformat.v4 import new_code_cell, new_notebook
 from panels import moved_sliders
 
-import floatbase as fb
-from floatbase.lessons import all_exercises, check, hand_in, progress
+from floatbase.lessons import all_exercises, check, progress
 from floatbase.lessons.publish import (
     NOTEBOOKS,
     read_notebook,
@@ -31,73 +27,33 @@ from floatbase.lessons.publish import (
     with_solutions,
 )
 
-MARK = "FLOATBASE_STARTED_BY_TEST"
 HOME = 'os.environ["FLOATBASE_HOME"]'
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
-# s of one core: a lesson takes at most 20, and up to 25 with all its answers; twice that on a slow
-# or busy machine
-LIMIT = 50.0
-TOOK: dict[str, float] = {}  # what each run of a lesson took
+# processor time [s]: a lesson takes at most 9 with all its answers, and three times as long on a
+# slow or busy machine
+LIMIT = 25.0
 
 
-@pytest.fixture(scope="module", autouse=True)
-def compiled() -> None:
-    """The controller is compiled before a lesson is measured or compared: where it was not yet,
-    that takes long and is told.
-    """
-    robot = fb.load("go2")
-    fb.WholeBodyController(robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing()))
+@pytest.fixture(scope="module")
+def lessons() -> Iterator[LessonRunner]:
+    """The program that runs the lessons. The processes of a lesson carry its mark."""
+    runner = LessonRunner(mark=str(os.getpid()))
+    yield runner
+    runner.stop()
 
 
 def ids(path: Path) -> str:
     return path.stem
 
 
-def nbval(path: Path, home: Path) -> str:
-    """Run a lesson by nbval, for a learner whose home is `home`; what it printed."""
-    # pytest's other plugins take as long to load as a lesson takes to run
-    options = ["-p", "nbval.plugin", "--nbval", "-q", "-p", "no:cacheprovider", "-c", os.devnull]
-    environment = {
-        **os.environ,
-        MARK: str(os.getpid()),
-        "FLOATBASE_HOME": str(home),
-        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
-    }
-    command = [sys.executable, "-m", "pytest", *options, str(path)]
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=path.parent, timeout=200, env=environment
-    )
-    assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
-    return done.stdout
-
-
-@contextlib.contextmanager
-def timed(run: str) -> Iterator[None]:
-    """Note the processor time of the processes that are started and ended here, and hold it to the
-    limit.
-    """
-
-    def used() -> float:
-        times = os.times()
-        return times.children_user + times.children_system
-
-    before = used()
-    yield
-    TOOK[run] = used() - before
-    print(f"{run}: {TOOK[run]:.1f} s")
-    assert TOOK[run] < LIMIT
-
-
-def left_behind() -> list[str]:
-    """Processes that a lesson started and that outlive it, whoever their parent is now: they carry
-    the mark.
-    """
+def left_behind(runner: LessonRunner) -> list[str]:
+    """Processes with the mark that outlive their lesson, whoever their parent is now."""
     found: list[str] = []
     for _ in range(50):  # those about to end may take 5 s to do so
         found = []
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):
-                if process.environ().get(MARK) == str(os.getpid()):
+                if process.pid != runner.pid and process.environ().get(MARK) == str(os.getpid()):
                     found.append(" ".join(process.cmdline()))
         if not found:
             break
@@ -116,10 +72,19 @@ __lessons.compare = __watched
 """
 
 
+# the last thing that a learner does, and what a teacher does with the file
+HAND_IN = """
+import json
+from pathlib import Path
+from floatbase.lessons import hand_in
+from floatbase.lessons.publish import grades
+__results = grades.grade_file(hand_in("Ada")).results
+Path("grades.json").write_text(json.dumps({one.exercise: one.result for one in __results}))
+"""
+
+
 def followed_by_its_learner(path: Path) -> Any:
-    """A lesson, and after it what a learner would have done: said something at each prediction, and
-    solved all exercises.
-    """
+    """A lesson, and after it what a learner would do: predict, solve all exercises, hand in."""
     notebook, answers = read_notebook(path), with_solutions(read_notebook(path)).cells
     after = [
         f"import os; assert os.listdir({HOME}) == []  # no exercise was tried, no prediction made",
@@ -134,6 +99,7 @@ def followed_by_its_learner(path: Path) -> Any:
         re.sub(r"^check\((.*)\)$", r"assert check(\1).right, check(\1)", cell.source, flags=re.M)
         for cell in checks(answers)
     ]
+    after += [HAND_IN]
     cells = [
         new_code_cell(source, metadata={"tags": ["nbval-ignore-output"]})
         for source in [WATCH, *after]
@@ -162,15 +128,17 @@ def with_an_answer(source: str) -> str:
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    path: Path, lessons: LessonRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     home = tmp_path / "home"
     home.mkdir()
     notebook = followed_by_its_learner(path)
     nbformat.write(notebook, tmp_path / path.name)
-    with timed(path.stem):
-        assert "passed" in nbval(tmp_path / path.name, home)
-    assert left_behind() == []
+    run = lessons.run(tmp_path / path.name, home)
+    assert run.status == 0 and "passed" in run.printed, run.printed[-6000:]
+    assert left_behind(lessons) == []
+    print(f"{path.stem}: {run.seconds:.1f} s")
+    assert 0.2 < run.seconds < LIMIT  # a run that took nothing was not measured
     monkeypatch.setenv("FLOATBASE_HOME", str(home))
     names = [
         cell.metadata["prediction"] for cell in notebook.cells if "prediction" in cell.metadata
@@ -182,32 +150,9 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
     number = path.stem.split("_")[0]
     solved_now = {name for name, entry in progress.load().items() if entry["right"]}
     assert solved_now == {name for name in all_exercises() if name.startswith(f"{number}.")}
-    results = graded(hand_in("Ada", tmp_path))
-    right = {name for name, result in results.items() if result in ("right", "to be read")}
-    assert right == solved_now, results
-
-
-def graded(file: Path) -> dict[str, str]:
-    """Exercise -> result, in a process of its own: with --seed this one draws other states than the
-    lesson did.
-    """
-    program = (
-        "import json, sys; from pathlib import Path; from floatbase.lessons.publish import grades; "
-        "marks = grades.grade_file(Path(sys.argv[1])).results; "
-        "print(json.dumps({mark.exercise: mark.result for mark in marks}))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, str(file)], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return dict(json.loads(done.stdout))
-
-
-def test_all_lessons_together_take_less_than_half_of_the_five_minutes() -> None:
-    if len(TOOK) < len(LESSONS):
-        pytest.skip("not all lessons were run here")
-    each = sum(TOOK.values()) / len(TOOK)
-    assert 1.0 < each < 20.0  # a run that took nothing was not measured; two cores share them
+    grades = json.loads((tmp_path / "grades.json").read_text())
+    right = {name for name, grade in grades.items() if grade in ("right", "to be read")}
+    assert right == solved_now, grades
 
 
 def lines_after_imports(source: str) -> int:
@@ -216,7 +161,7 @@ def lines_after_imports(source: str) -> int:
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_stored_lesson_is_small_has_short_cells_and_holds_no_picture(path: Path) -> None:
+def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path: Path) -> None:
     assert path.stat().st_size < 1_000_000
     notebook = read_notebook(path)
     assert "widgets" not in notebook.metadata
@@ -243,7 +188,7 @@ def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
         assert source == known[name].stub
 
 
-def test_exercises_have_no_answer_at_first_and_say_so() -> None:
+def test_an_exercise_without_an_answer_gets_its_own_verdict() -> None:
     verdicts = {name: check(name, None) for name in all_exercises()}
     assert [
         name
@@ -252,7 +197,7 @@ def test_exercises_have_no_answer_at_first_and_say_so() -> None:
     ] == []
 
 
-def test_a_run_stores_what_a_lesson_prints_and_counts_no_try_of_a_learner(tmp_path: Path) -> None:
+def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path: Path) -> None:
     spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"
@@ -270,5 +215,5 @@ def test_a_run_stores_what_a_lesson_prints_and_counts_no_try_of_a_learner(tmp_pa
     assert progress.load() == before
 
 
-def test_tests_leave_the_progress_of_whoever_runs_them_alone() -> None:
+def test_tests_do_not_touch_the_progress_of_their_user() -> None:
     assert Path.home() not in progress.path().parents

@@ -4,6 +4,7 @@ found by its search.
 
 from __future__ import annotations
 
+import html
 import re
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import nbformat
 import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from PIL import ImageFont
 
 from floatbase.errors import InputError
 from floatbase.lessons.publish import NOTEBOOKS, equations, read_notebook
@@ -28,9 +30,13 @@ from floatbase.lessons.publish.site import (
     replace_site,
     run_lessons,
 )
+from floatbase.lessons.questions import all_questions
 
 pytestmark = [pytest.mark.front_end, pytest.mark.timeout(600)]
 SHOWN = ["00_start_here.ipynb", "06_friction_cones.ipynb"]
+ROOT = NOTEBOOKS.parent
+FONT = "floatbase/lessons/publish/site/static/formulas.woff"
+ITALIC = ((0x1D434, 0x1D454), (0x1D456, 0x1D467), (0x210E, 0x210E), (0x1D6FC, 0x1D714))
 MOST = 3e6  # bytes of a page with its images
 browser = browser_of_a_file
 
@@ -292,7 +298,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
             "## Curve"
         ),
         new_code_cell("draw()", outputs=outputs),
-        new_code_cell('predict("07.a", ..., choices=["a", "b"])', metadata={"tags": ["predict"]}),
+        new_code_cell('predict("07.a", ...)', metadata={"prediction": "07.a"}),
         new_code_cell("assert found", metadata={"tags": ["claims"]}),
         new_code_cell("x = ...", metadata={"tags": ["exercise"]}),
         new_code_cell('check("07.1", x)', metadata={"tags": ["check"]}, outputs=outputs),
@@ -305,7 +311,8 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
     assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
     assert list(image.data) == ["image/png"]
     assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
-    assert "*a* or *b*" in asked.source and "(../installation.md)" in asked.source
+    assert all(choice in asked.source for choice in all_questions()["07.a"].choices)
+    assert "(../installation.md)" in asked.source
     assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
     assert {check.cell_type, said.cell_type} == {
         "markdown"
@@ -342,19 +349,28 @@ def test_links_leave_code_formulas_and_links_as_they_are() -> None:
     )
 
 
-def test_every_formula_of_the_course_becomes_mathml() -> None:
+def test_every_formula_of_the_course_becomes_mathml_in_the_font_of_the_site() -> None:
     texts = [
         cell.source
         for path in NOTEBOOKS.glob("*.ipynb")
         for cell in read_notebook(path).cells
         if cell.cell_type == "markdown"
     ]
+    texts += [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
     plain = "\n\n".join(re.sub(r"`[^`\n]*`", "", text) for text in [*texts, equations.table()])
     found = re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", plain, re.DOTALL)
     assert len(found) > 300
+    letters = set()
     for latex in {block or inline for block, inline in found}:
         drawn = mathml.mathml(re.sub(r"\\tag\{.*?\}", "", latex), "block")
         assert "\\" not in re.sub(r"<annotation.*?</annotation>|&#x0005C;", "", drawn), latex
+        letters |= set(html.unescape(re.sub(r"<annotation.*?</annotation>|<[^>]*>", "", drawn)))
+    # browsers draw a single letter as one of these
+    italic = {chr(code) for first, last in ITALIC for code in range(first, last + 1)}
+    font = ImageFont.truetype(ROOT / FONT, 40)
+    missing = bytes(font.getmask("\uffff"))
+    shown = sorted(letter for letter in letters | italic if not letter.isspace())
+    assert [letter for letter in shown if bytes(font.getmask(letter)) == missing] == []
 
 
 def test_a_lesson_that_is_not_there_is_told(tmp_path: Path) -> None:

@@ -17,39 +17,31 @@ import floatbase
 PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
-LAYERS = (
-    (
-        "conventions",
-        "errors",
-        "_validation",
-        "_assets",
-        "_files",
-        "_geometry",
-        "affine",
-        "linear_algebra",
-    ),
-    ("qp",),
-    ("robots",),
-    ("dynamics",),
-    ("objectives",),
-    ("friction",),
-    ("control",),
-    ("actuators",),
-    ("simulation",),
-    ("behaviours",),
-    ("viewer",),
-    ("playground",),
-    ("lessons",),
-    ("__main__",),
-)
-LAYER_OF = {package: layer for layer, packages in enumerate(LAYERS) for package in packages}
+LAYERS = """
+    conventions errors _validation _assets _files _geometry affine linear_algebra
+    qp
+    robots
+    dynamics
+    objectives
+    friction
+    control
+    actuators
+    simulation
+    behaviours
+    viewer
+    live
+    playground
+    lessons
+    __main__
+"""
+LAYER_OF = {name: layer for layer, line in enumerate(LAYERS.split("\n")) for name in line.split()}
 MAX_LINES = 400  # of a module, without docstrings
 MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
 ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
 # numba loads with them, so no __init__ imports them
 COMPILED = {
-    "floatbase.behaviours.compiled_targets",
+    "floatbase.behaviours.walk.compiled_targets",
     "floatbase.control.tick.jit",
     "floatbase.control.tick.tick",
 }
@@ -65,6 +57,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 USERS = [
     *TESTS,
     *sorted((ROOT / "benchmarks").rglob("*.py")),
+    *sorted((ROOT / "examples").rglob("*.py")),
     *sorted((ROOT / "notebooks").glob("*.ipynb")),
 ]
 PACKAGES = [
@@ -88,13 +81,12 @@ def layer(path: Path) -> int:
     return LAYER_OF[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
 
+@cache
 def file_of(module: str) -> Path | None:
     """The file of a module of the package."""
     folder = ROOT.joinpath(*module.split("."))
-    return next(
-        (path for path in (folder / "__init__.py", folder.with_suffix(".py")) if path in MODULES),
-        None,
-    )
+    files = (folder / "__init__.py", folder.with_suffix(".py"))
+    return next((path for path in files if path in MODULES), None)
 
 
 @cache
@@ -110,16 +102,21 @@ def parsed(path: Path) -> ast.Module:
 
 
 @cache
+def nodes(path: Path) -> list[ast.AST]:
+    return list(ast.walk(parsed(path)))
+
+
+@cache
 def imports(path: Path) -> list[Import]:
     """All imports of the package's modules at run time, also inside functions."""
     blocks = [
         node
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
     ]
     for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
     found = []
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import) and node not in for_types:
             found += [Import(node.lineno, alias.name, None) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node not in for_types:
@@ -151,13 +148,13 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
     return [set(ring) for ring in rings if ring]
 
 
-def test_every_module_has_a_layer() -> None:
+def test_every_module_has_a_layer():
     assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in LAYERED} <= set(
         LAYER_OF
     )
 
 
-def test_modules_import_only_their_own_layer_and_lower_ones() -> None:
+def test_modules_import_only_their_own_layer_and_lower_ones():
     wrong = []
     for path in LAYERED:
         for found in imports(path):
@@ -169,11 +166,11 @@ def test_modules_import_only_their_own_layer_and_lower_ones() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_no_module_of_the_package_is_imported_by_a_string() -> None:
+def test_no_module_of_the_package_is_imported_by_a_string():
     """Except by an `__init__`, which is lazy; lessons are found by the names of their folders."""
     wrong = []
     for path in [path for path in MODULES if path.name != "__init__.py"]:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if not isinstance(node, ast.Call) or not node.args:
                 continue
             called, module = ast.unparse(node.func).rpartition(".")[2], node.args[0]
@@ -184,7 +181,7 @@ def test_no_module_of_the_package_is_imported_by_a_string() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_packages_are_imported_by_their_public_names() -> None:
+def test_packages_are_imported_by_their_public_names():
     """Or by a module with a leading underscore; a package whose `__all__` is empty has modules for
     the packages above it. A package's own modules may import one another.
     """
@@ -202,22 +199,32 @@ def test_packages_are_imported_by_their_public_names() -> None:
             if package and (top_folder(package) in path.parents):
                 continue
             if found.module in PACKAGES:
-                public = import_module(found.module).__all__
-                if found.name and found.name not in public:
+                if found.name and found.name not in public_names(found.module):
                     wrong.append(
                         f"{relative(path)}:{found.line} imports {found.name}, which "
                         f"{found.module} does not export"
                     )
-            elif package and inner not in (public := import_module(outer).__all__) and public:
+            elif package and inner not in (public := public_names(outer)) and public:
                 wrong.append(f"{relative(path)}:{found.line} imports {found.module}, a module")
     assert not wrong, "\n".join(dict.fromkeys(wrong))
+
+
+@cache
+def public_names(package: str) -> list[str]:
+    """Return the names in `__all__`; without it, as in a lesson, those that `__init__` imports."""
+    listed = getattr(import_module(package), "__all__", None)
+    if listed is None:
+        path = file_of(package)
+        assert path
+        return [found.name for found in imports(path) if found.name]
+    return list(listed)
 
 
 def top_folder(path: Path) -> Path:
     return PACKAGE / path.relative_to(PACKAGE).parts[0]
 
 
-def test_only_robot_state_and_standing_import_one_another() -> None:
+def test_only_robot_state_and_standing_import_one_another():
     names = {path: path.relative_to(PACKAGE).as_posix() for path in LAYERED}
     graph = {
         names[path]: {
@@ -239,7 +246,7 @@ def docstring_lines(tree: ast.Module) -> int:
     return sum(1 + (string.end_lineno or 0) - string.lineno for string in strings)
 
 
-def test_modules_are_short_documented_and_finished() -> None:
+def test_modules_are_short_documented_and_finished():
     wrong = []
     for path in MODULES:
         source = path.read_text(encoding="utf-8")
@@ -256,7 +263,7 @@ def test_modules_are_short_documented_and_finished() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_lines_of_javascript_are_at_most_100_characters_long() -> None:
+def test_lines_of_javascript_are_at_most_100_characters_long():
     """Ruff checks those of Python."""
     wrong = [
         f"{relative(path)}:{number} has {len(line)} characters"
@@ -268,11 +275,11 @@ def test_lines_of_javascript_are_at_most_100_characters_long() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_every_public_name_resolves_and_has_a_docstring() -> None:
+def test_every_public_name_resolves_and_has_a_docstring():
     wrong = []
     for package in ["floatbase", *PACKAGES]:
         module = import_module(package)
-        for name in getattr(module, "__all__", []):
+        for name in public_names(package):
             value = getattr(module, name)
             doc = inspect.getdoc(value) or ""
             needs_one = inspect.ismodule(value) or (callable(value) and not get_origin(value))
@@ -281,17 +288,17 @@ def test_every_public_name_resolves_and_has_a_docstring() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_floatbase_has_at_most_32_names_and_lists_them() -> None:
+def test_floatbase_has_at_most_32_names_and_lists_them():
     assert len(set(floatbase.__all__)) == len(floatbase.__all__) <= 32
     assert set(floatbase.__all__) <= set(dir(floatbase))
     with raises(AttributeError, "Robit"):
         _ = floatbase.Robit
 
 
-def test_tests_use_public_names() -> None:
+def test_tests_use_public_names():
     wrong = []
     for path in TESTS:
-        for node in ast.walk(parsed(path)):
+        for node in nodes(path):
             if (
                 isinstance(node, ast.Attribute)
                 and is_private(node.attr)
@@ -302,6 +309,57 @@ def test_tests_use_public_names() -> None:
             if is_private(found.name or ""):
                 wrong.append(f"{relative(path)}:{found.line} imports {found.name}")
     assert not wrong, "\n".join(wrong)
+
+
+def private_names_of_others(path: Path, own_names: set[str]) -> list[str]:
+    """Private attributes and imports of a module whose names its own package does not define."""
+    found = []
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            used = ast.unparse(node)
+            is_own = node.attr in own_names or ast.unparse(node.value) in ("self", "cls")
+            if not is_own and used != "os._exit":
+                found.append(f"{node.lineno} uses {used}")
+        elif isinstance(node, ast.ImportFrom):
+            names = [alias.name for alias in node.names if is_private(alias.name)]
+            found += [
+                f"{node.lineno} imports {name}"
+                for name in names
+                if name not in own_names and not file_of(f"{node.module}.{name}")
+            ]
+    return found
+
+
+def defined_names(path: Path) -> set[str]:
+    """All names that a module defines: functions, classes, variables and attributes."""
+    names = set()
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.attr if isinstance(node, ast.Attribute) else node.id)
+    return names
+
+
+def test_no_package_uses_private_names_of_another_package() -> None:
+    names: dict[Path, set[str]] = {}
+    for path in LAYERED:
+        names.setdefault(top_folder(path), set()).update(defined_names(path))
+    wrong = [
+        f"{relative(path)}:{found}"
+        for path in LAYERED
+        for found in private_names_of_others(path, names[top_folder(path)])
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_private_names_of_another_package_are_found(tmp_path: Path) -> None:
+    path = tmp_path / "module.py"
+    path.write_text(
+        "from a import _b\nsim._c\nself._d\nwalk._own._own\nsim.made()._e\nx.__name__\n"
+    )
+    found = private_names_of_others(path, {"_own"})
+    assert found == ["1 imports _b", "2 uses sim._c", "5 uses sim.made()._e"]
 
 
 def is_private(name: str) -> bool:
@@ -387,12 +445,12 @@ def sets_in_order(tree: ast.Module, returning: set[str]) -> list[ast.expr]:
     return found
 
 
-def test_nothing_depends_on_the_order_of_a_set() -> None:
+def test_nothing_depends_on_the_order_of_a_set():
     """The order of a set of names changes with Python's hash seed, and with it the rounding."""
     returning = {
         f"{node.name}()"
         for path in MODULES
-        for node in ast.walk(parsed(path))
+        for node in nodes(path)
         if isinstance(node, ast.FunctionDef) and is_set_type(node.returns)
     }
     wrong = {
@@ -403,7 +461,7 @@ def test_nothing_depends_on_the_order_of_a_set() -> None:
     assert not wrong, "\n".join(sorted(wrong))
 
 
-def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed() -> None:
+def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed():
     wrong = [
         "for foot in set(a) - set(b): pass",
         "for foot in {'FL', 'FR'}: pass",

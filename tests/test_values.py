@@ -17,6 +17,7 @@ from typing import Any
 import judges
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from values import UP, controller, record, values
 
 import floatbase as fb
@@ -24,18 +25,10 @@ from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.control import AnalyticController
 from floatbase.dynamics import PointContact
 
-WITHOUT_ARRAYS = (
-    "ActiveSetRun",
-    "FeasibleSpace",
-    "Gains",
-    "LinearConstraint",
-    "drive",
-    "Gait",
-    "Problem",
-    "SensorNoise",
-    "Residuals",
-    "LinearInequality",
-)
+WITHOUT_ARRAYS = """
+    ActiveSetRun FeasibleSpace Gains Gait LinearConstraint LinearInequality Problem Residuals
+    SensorNoise drive
+"""
 NO_VALUES = {
     "control and physics, tested below": "AnalyticController Cylinders HydraulicActuators "
     "Simulation WholeBodyController",
@@ -82,11 +75,11 @@ def same(a: Any, b: Any) -> bool:
     )
 
 
-def test_every_public_class_is_tested_here_or_no_value() -> None:
+def test_every_public_class_is_tested_here_or_no_value():
     classes = {
         name: found
         for package in packages()
-        for name in package.__all__
+        for name in getattr(package, "__all__", vars(package))  # a lesson has no list
         if inspect.isclass(found := getattr(package, name)) and not issubclass(found, Exception)
     }
     protocols = {name for name, found in classes.items() if getattr(found, "_is_protocol", False)}
@@ -101,7 +94,7 @@ def test_every_public_class_is_tested_here_or_no_value() -> None:
     ] == []
 
 
-def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
+def test_no_array_and_no_attribute_of_a_value_can_be_written_to():
     robot, state, contacts = values()["Robot"], values()["State"], values()["Contacts"]
     own = {
         "AnalyticController": AnalyticController(robot, contacts, state),
@@ -109,7 +102,7 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
     }
     for kind, value in (values() | own).items():
         arrays = arrays_of(value)
-        assert bool(arrays) != (kind in WITHOUT_ARRAYS), kind
+        assert bool(arrays) != (kind in WITHOUT_ARRAYS.split()), kind
         for name, array in arrays.items():
             with pytest.raises(ValueError):
                 array[...] = 0.0
@@ -125,7 +118,7 @@ def test_no_array_and_no_attribute_of_a_value_can_be_written_to() -> None:
 @pytest.mark.parametrize(
     "copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))]
 )
-def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> None:
+def test_copies_of_values_hold_the_same_and_are_read_only_too(copied):
     robot = values()["Robot"]
     for kind, value in values().items():
         other = copied(value)
@@ -141,13 +134,11 @@ def test_copies_of_values_hold_the_same_and_are_read_only_too(copied: Any) -> No
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
-def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
-    robot, state, contacts, control = (
-        values()["Robot"],
-        values()["State"],
-        values()["Contacts"],
-        controller(),
-    )
+def test_a_copy_of_a_simulation_goes_on_like_the_original(copied):
+    robot = values()["Robot"]
+    state = values()["State"]
+    contacts = values()["Contacts"]
+    control = controller()
     push = fb.Push([0.0, 60.0, 0.0], start=0.005)
     sim, oil = fb.Simulation(robot), HydraulicActuators(robot)
     fb.rollout(sim, control, 0.01, [push], actuators=oil)
@@ -155,44 +146,41 @@ def test_a_copy_of_a_simulation_goes_on_like_the_original(copied: Any) -> None:
     runs = [
         fb.rollout(s, c, 0.02, [push], actuators=a) for s, c, a in ((sim, control, oil), others)
     ]
-    np.testing.assert_array_equal(runs[0].q, runs[1].q)
+    assert_array_equal(runs[0].q, runs[1].q)
     assert np.ptp(runs[0].q, axis=0).max() > 1e-4
-    assert (
-        not others[2].state.pressures.flags.writeable
-        and not others[2].cylinders.areas.flags.writeable
-    )
+    assert not others[2].state.pressures.flags.writeable
+    assert not others[2].cylinders.areas.flags.writeable
     fb.rollout(sim, alone, 0.001)  # the controller of a robot that was copied, and not the robot
     analytic = AnalyticController(robot, contacts, state)
-    np.testing.assert_array_equal(
-        copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau
-    )
+    assert_array_equal(copied(analytic)(state.q, state.v).tau, analytic(state.q, state.v).tau)
     assert not copied(analytic).com.flags.writeable
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
-def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied: Any) -> None:
+def test_a_copy_of_a_late_actuator_goes_on_like_the_original_and_alone(copied):
     robot = values()["Robot"]
     still, first, second = np.zeros(12), np.arange(12.0), -np.arange(12.0)
     for late in (Delay(robot, 2e-3), FirstOrderLag(robot, 10.0)):
         late.step(first, still, still, 1e-3)
         other = copied(late)
         steps = [[one.step(second, still, still, 1e-3) for _ in range(3)] for one in (late, other)]
-        np.testing.assert_array_equal(*steps)
+        assert_array_equal(*steps)
         assert np.ptp(steps[0], axis=0).max() > 0.5
 
 
-def test_values_come_back_from_another_process() -> None:
+@pytest.mark.front_end
+def test_values_come_back_from_another_process():
     robot, control = values()["Robot"], controller()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         back = dict(zip(values(), pool.map(copy.copy, values().values()), strict=True))
         run = pool.submit(fb.rollout, fb.Simulation(robot), control, 0.005).result()
     assert [kind for kind, value in back.items() if not same(value, values()[kind])] == []
-    np.testing.assert_array_equal(run.q, record().q)
+    assert_array_equal(run.q, record().q)
     assert isinstance(back["State"], fb.State) and not back["State"].q.flags.writeable
     fb.Simulation(robot).reset(run.final)  # a state of the same robot
 
 
-def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same() -> None:
+def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_the_same():
     """A lock would be held for ever in a process that is forked meanwhile."""
     started, go_on = threading.Event(), threading.Event()
 
@@ -213,7 +201,7 @@ def test_threads_need_not_wait_for_what_another_computes_of_a_value_and_all_get_
         assert other.result() is normals is contacts.normals
 
 
-def test_what_a_value_returns_cannot_be_written_to() -> None:
+def test_what_a_value_returns_cannot_be_written_to():
     state, contacts, command = values()["State"], values()["Contacts"], values()["Command"]
     wrenches = values()["WrenchSet"]
     answers = {
@@ -221,7 +209,7 @@ def test_what_a_value_returns_cannot_be_written_to() -> None:
         "point": state.point("base"),
         "positions": contacts.positions(state), "jacobian": contacts.jacobian(state),
         "A": contacts.constraint(state)[0],
-        "torques": wrenches.moment_vertices(), "support_region": wrenches.support_region(),
+        "support_region": wrenches.support_region(),
         "solution block": command.solution["tau"],
         "slip": record().slip(), "final q": record().final.q,
         "command force": command.force("FL_foot"),

@@ -36,7 +36,7 @@ from floatbase.lessons.publish import NOTEBOOKS, read_notebook
 SINKS = 0.02  # m: by 49 mm, where the robot carries half its mass more than its controller knows
 PLAYGROUND = 'from floatbase.playground import playground\nplayground("go2")'
 ICONS = "/@fortawesome/"
-MASS = "viewer.gui_controllers['mass [×] reality']"
+MASS = "viewer.gui_controllers['mass [%] reality']"
 
 pytestmark = [
     pytest.mark.front_end,
@@ -101,7 +101,7 @@ def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> N
         field = picture_in(page.locator(".jp-Cell", has=page.locator("iframe")).last)
         field.wait_for_function(MASS)
         standing = field.evaluate(HEIGHT)
-        field.evaluate(f"{MASS}.setValue(1.5)")  # unknown to the controller
+        field.evaluate(f"{MASS}.setValue(150)")  # unknown to the controller
         field.wait_for_function(f"({HEIGHT})() < {standing - SINKS}")
         assert [url for url in strangers if ICONS not in url] == []
         assert page.get_by_text("Traceback").count() == 0

@@ -298,10 +298,8 @@ class Cylinders(Value):
             [extension, 2.0 * self.crank - extension]
         )
         compliance = volumes / self.hydraulics.bulk_modulus
-        lever, stiffness = (
-            self.base * self.crank * np.sin(gamma) / length,
-            np.sum(self.areas**2 / compliance, axis=0),
-        )
+        lever = self.base * self.crank * np.sin(gamma) / length
+        stiffness = np.sum(self.areas**2 / compliance, axis=0)
         return CylinderGeometry(*map(read_only, (length, lever, volumes, compliance, stiffness)))
 
     def force(self, pressures: Array) -> Array:

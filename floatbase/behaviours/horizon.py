@@ -220,7 +220,9 @@ class HorizonQP(Value):
         X, column = np.zeros(S.shape[1:]), 0
         fall = np.zeros(12)
         fall[COM], fall[VELOCITY] = [0, 0, -self.gravity * dt**2 / 2], [0, 0, -self.gravity * dt]
-        inverse, unit, A = np.linalg.inv(self.inertia), np.eye(3), np.eye(12)
+        inverse = np.linalg.inv(self.inertia)
+        unit = np.eye(3)
+        A = np.eye(12)
         A[COM, VELOCITY] = dt * unit
         for k in range(n):
             Rz = rotation_z(reference[k, 2])

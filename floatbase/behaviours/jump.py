@@ -23,9 +23,9 @@ from floatbase._validation import (
     refuse_new_attributes,
 )
 from floatbase.behaviours._level_place import foot_outline
-from floatbase.behaviours.options import as_vector, check_options, flat_foot_names
-from floatbase.behaviours.speed import leg_joints
 from floatbase.behaviours.terrain import Terrain, as_terrain
+from floatbase.behaviours.walk.gait_limits import leg_joints
+from floatbase.behaviours.walk.options import as_vector, check_options, flat_foot_names
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError

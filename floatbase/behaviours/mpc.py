@@ -12,8 +12,6 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array, as_array, as_instance, as_integer, as_positive
-from floatbase.behaviours.active_plan import ActivePlan
-from floatbase.behaviours.gait import TIME_TOLERANCE, Gait, flight_offset
 from floatbase.behaviours.horizon import (
     COM,
     OMEGA,
@@ -23,12 +21,14 @@ from floatbase.behaviours.horizon import (
     HorizonMotion,
     HorizonQP,
 )
-from floatbase.behaviours.lipm import LIPM
-from floatbase.behaviours.options import Gains, flat_foot_names
-from floatbase.behaviours.plan import StepPlan
-from floatbase.behaviours.swing import SwingPath
-from floatbase.behaviours.targets import com_target
-from floatbase.behaviours.walk import Entries, Walk
+from floatbase.behaviours.walk.active_plan import ActivePlan
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE, Gait, flight_offset
+from floatbase.behaviours.walk.lipm import LIPM
+from floatbase.behaviours.walk.options import Gains, flat_foot_names
+from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.swing import SwingPath
+from floatbase.behaviours.walk.targets import com_target
+from floatbase.behaviours.walk.walk import Entries, Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
@@ -148,7 +148,9 @@ class MPC(Walk):
 
     def _clear(self) -> None:
         super()._clear()
-        robot, posture, limits = self.robot, self._posture, self._controllers.limits
+        robot = self.robot
+        posture = self._posture
+        limits = self._controllers.limits
         data = robot.model.createData()
         pin.ccrba(robot.model, data, posture.state.q, np.zeros(robot.nv))
         mu = min(
@@ -179,7 +181,7 @@ class MPC(Walk):
         self._flight = self._first_flight()
         if self._flight is not None:
             times = plan.time + _PATH_STEP * np.arange(_PATH_STEPS + 1)
-            points = [plan.path.moved(self._desired, time).position for time in times]
+            points = [plan.path.moved(self._progress.desired, time).position for time in times]
             segments = list(zip(times[:-1], times[1:], points[:-1], points[1:], strict=True))
             plan = replace(plan, plan=LIPM(segments, state.com[:2], self.omega))
         return super()._modified(plan, state)
@@ -189,7 +191,7 @@ class MPC(Walk):
 
         None if a foot always stands. All flights are assumed to be like the first one.
         """
-        gait = replace(self._clock.gait, stop=None)
+        gait = replace(self._progress.clock.gait, stop=None)
         if len(gait.feet) < len(self._all_contacts) or flight_offset(gait) is None:
             return None
         phases = gait.phases(gait.start, _GAIT_PHASES, gait.period)
@@ -232,10 +234,12 @@ class MPC(Walk):
 
     def _reference(self, t: float, active: ActivePlan) -> Array:
         """Return the desired state at the end of each interval, shape (n, 12)."""
-        reference, pose, now = np.zeros((self._n, 12)), self._leaning_pose, active.path
+        reference = np.zeros((self._n, 12))
+        pose = self._leaning_pose
+        now = active.path
         for k, row in enumerate(reference):
             time = t + (k + 1) * self._dt
-            path = now.moved(self._desired, time)
+            path = now.moved(self._progress.desired, time)
             row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
             row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
             rise, speed = self._bounce(time)
@@ -251,7 +255,7 @@ class MPC(Walk):
         last one, the reference is level.
         """
         flight, gravity = self._flight, self.robot.gravity
-        if flight is None or self._clock.gait.stop is not None:
+        if flight is None or self._progress.clock.gait.stop is not None:
             return 0.0, 0.0
         begin, T, interval = flight
         stance = interval - T
@@ -271,7 +275,8 @@ class MPC(Walk):
         A foot stands in an interval if it stands in its middle, or in the first one, if it stands
         now.
         """
-        gait, names, swings = self._clock.gait, self._all_contacts.names, active.swings
+        gait, names = self._progress.clock.gait, self._all_contacts.names
+        swings = active.swings
         points, stance = np.zeros((self._n, len(names), 3)), np.zeros((self._n, len(names)), bool)
         for i, foot in enumerate(names):
             offset = self._contact_offsets[foot]

@@ -41,10 +41,8 @@ def pitch_and_yaw(
             as_array("the result of angles(t)", angles(t + shift), (2,), "rad")
             for shift in (-_DIFFERENCE_STEP, 0.0, _DIFFERENCE_STEP)
         )
-        (p1, y1), (p2, y2) = (
-            (after - before) / (2.0 * _DIFFERENCE_STEP),
-            (after - 2.0 * now + before) / _DIFFERENCE_STEP**2,
-        )
+        p1, y1 = (after - before) / (2.0 * _DIFFERENCE_STEP)
+        p2, y2 = (after - 2.0 * now + before) / _DIFFERENCE_STEP**2
         R = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
         yaw_axis, pitch_axis = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
         return (

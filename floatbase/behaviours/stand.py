@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from floatbase._validation import Array, as_instance, as_number, as_positive
-from floatbase.behaviours.footholds import capture_point, support_margin
-from floatbase.behaviours.gait import Gait, check_always_supported
-from floatbase.behaviours.walk import Walk
+from floatbase.behaviours.walk.footholds import capture_point, support_margin
+from floatbase.behaviours.walk.gait import Gait, check_always_supported
+from floatbase.behaviours.walk.walk import Walk
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
@@ -74,10 +74,8 @@ class Stand(Walk):
         self._standing_gait = replace(
             as_instance("stepping_gait", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0
         )
-        self.stepping_gait, self.margin = (
-            stepping_gait,
-            as_positive("margin", margin, "m", allow_zero=True, maximum=1.0),
-        )
+        self.stepping_gait = stepping_gait
+        self.margin = as_positive("margin", margin, "m", allow_zero=True, maximum=1.0)
         if {"velocity", "yaw_rate", "gait"} & set(options):
             raise InputError(
                 "Stand has no options velocity, yaw_rate and gait, because it stays in place. Use "

@@ -71,10 +71,16 @@ class Command(Value):
     ) -> None:
         # writing to the dictionary takes 0.1 µs per control step, a frozen dataclass 0.4 µs more
         values = self.__dict__
-        values["tau"], values["qdd"], values["forces"] = tau, qdd, forces
-        values["contacts"], values["backend"], values["_solution"] = contacts, backend, solution
-        values["softened"], values["joint_limits"] = softened, joint_limits
-        values["target_values"], values["target_entries"] = target_values, target_entries
+        values["tau"] = tau
+        values["qdd"] = qdd
+        values["forces"] = forces
+        values["contacts"] = contacts
+        values["backend"] = backend
+        values["_solution"] = solution
+        values["softened"] = softened
+        values["joint_limits"] = joint_limits
+        values["target_values"] = target_values
+        values["target_entries"] = target_entries
 
     @property
     def targets(self) -> dict[str, Array]:
@@ -91,9 +97,8 @@ class Command(Value):
         return self._solution if isinstance(self._solution, Solution) else self._solution()
 
     def __getstate__(self) -> dict[str, Any]:
-        return super().__getstate__() | {
-            "_solution": self.solution
-        }  # the function that makes it holds the compiled tick
+        # the function that makes it holds the compiled tick
+        return super().__getstate__() | {"_solution": self.solution}
 
     def force(self, name: str) -> Array:
         """Return the planned force of one contact; for a flat foot, the sum over its corners.

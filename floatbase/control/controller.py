@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal, TypeAlias, cast, get_args
+from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -45,6 +45,14 @@ from floatbase.robots import Robot, State
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
+
+
+class _Settings(NamedTuple):
+    """Settings of a controller besides its problem."""
+
+    solver: str
+    backend: Backend
+    on_infeasible: OnInfeasible
 
 
 class WholeBodyController:
@@ -208,40 +216,28 @@ class WholeBodyController:
         check_solver(solver)
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
-        self._prepare(problem, solver, backend, on_infeasible)
-        self._prepare_softer_controllers()
+        self._prepare(problem, _Settings(solver, backend, on_infeasible))
+        _ = self._softer_controllers  # made here, outside the loop, since that takes milliseconds
 
-    def _prepare_softer_controllers(self) -> None:
-        """Make the controllers for infeasible states now, since that takes milliseconds."""
-        softer = self._settings[2] == "soften" and self._softer_controller
-        if softer:
-            softer._prepare_softer_controllers()
-
-    def _prepare(
-        self,
-        problem: Problem,
-        solver: str,
-        backend: Backend,
-        on_infeasible: OnInfeasible,
-        warm_up: bool = True,
-    ) -> None:
+    def _prepare(self, problem: Problem, settings: _Settings, warm_up: bool = True) -> None:
         """Store a checked problem, and prepare the compiled controller if it supports the problem.
 
         warm_up: whether to run it once, outside the loop.
         """
-        self._problem, self._settings = problem, (solver, backend, on_infeasible)
-        if backend == "reference":
+        self._problem = problem
+        self._settings = settings
+        if settings.backend == "reference":
             reason = "it was requested"
         elif problem.modify_qp is not None:
             reason = "modify_qp changes the QP"
         elif problem.level_sizes:
             reason = "the tasks have strict priorities"
         else:
-            reason = unsupported_reason(problem, solver)
+            reason = unsupported_reason(problem, settings.solver)
         compiled = None if reason else CompiledTick(problem)
         if compiled is not None and warm_up:
             reason = compiled.warm_up()
-        if reason and backend == "compiled":
+        if reason and settings.backend == "compiled":
             raise InputError(
                 f'backend="compiled" is not possible: {reason}. backend="auto" uses the fastest '
                 f"backend that supports the problem."
@@ -252,18 +248,35 @@ class WholeBodyController:
     def _with_problem(self, problem: Problem) -> WholeBodyController:
         """Return a controller of another problem with the same settings."""
         other = object.__new__(type(self))
-        other._prepare(problem, *self._settings, warm_up=self._compiled is None)
+        other._prepare(problem, self._settings, warm_up=self._compiled is None)
         return other
 
-    def __getstate__(self) -> tuple[Problem, tuple[str, Backend, OnInfeasible]]:
+    @cached_property
+    def _softer_controllers(self) -> tuple[WholeBodyController, ...]:
+        """Make the controllers for infeasible states: soft limits, then soft contacts as well."""
+        if self._settings.on_infeasible != "soften":
+            return ()
+        problem, softer_problems = self._problem, []
+        limits = problem.limits.softened(SOFT_LIMIT_WEIGHT)
+        if limits is not problem.limits:
+            problem = replace(problem, limits=limits)
+            softer_problems.append(problem)
+        if contact_weight_of(problem.tasks) is None:
+            softer_problems.append(_softened(problem, SOFT_CONTACT_WEIGHT))
+        controllers = tuple(self._with_problem(softer) for softer in softer_problems)
+        for controller in controllers:
+            controller._softened = True
+        return controllers
+
+    def __getstate__(self) -> tuple[Problem, _Settings]:
         """Return the problem and the settings, for copies and pickles.
 
         The compiled tick has views into Pinocchio's memory, so it is made again.
         """
         return self._problem, self._settings
 
-    def __setstate__(self, state: tuple[Problem, tuple[str, Backend, OnInfeasible]]) -> None:
-        self._prepare(state[0], *state[1])
+    def __setstate__(self, state: tuple[Problem, _Settings]) -> None:
+        self._prepare(*state)
 
     @property
     def problem(self) -> Problem:
@@ -273,7 +286,7 @@ class WholeBodyController:
     @property
     def solver(self) -> str:
         """Solver of the reference backend."""
-        return self._settings[0]
+        return self._settings.solver
 
     @property
     def compiled(self) -> CompiledTick | None:
@@ -401,15 +414,12 @@ class WholeBodyController:
         InfeasibleError
             If the QP has no solution, unless `on_infeasible` is "soften".
         """
-        softens = self._settings[2] == "soften"
-        if softens or self._compiled is not None:
+        if self._compiled is not None or self._settings.on_infeasible == "soften":
             command = self.attempt(q, v, t, targets)
             if command is not None:
                 return command
-        last, softer = self, softens and self._softer_controller
-        while softer:
-            last, softer = softer, softer._softer_controller
-        return last._reference_command(q, v, *self._checked_inputs(v, t, targets))
+        softest = (self, *self._softer_controllers)[-1]
+        return softest._reference_command(q, v, *self._checked_inputs(v, t, targets))
 
     def attempt(
         self,
@@ -449,8 +459,13 @@ class WholeBodyController:
         """
         t, target_array = self._checked_inputs(v, t, targets)
         command = self._attempt(q, v, t, target_array)
-        softer = command is None and self._settings[2] == "soften" and self._softer_controller
-        return softer.attempt(q, v, t, target_array) if softer else command
+        if command is not None:
+            return command
+        for softer in self._softer_controllers:
+            command = softer._attempt(q, v, t, target_array)
+            if command is not None:
+                return command
+        return None
 
     def _checked_inputs(
         self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
@@ -468,29 +483,12 @@ class WholeBodyController:
         self._layout.check_size(array)
         return t, array
 
-    @cached_property
-    def _softer_controller(self) -> WholeBodyController | None:
-        """Build the controller with soft limits or, if limits are soft, with soft contacts.
-
-        None if both are soft.
-        """
-        problem = self._problem
-        limits = problem.limits.softened(SOFT_LIMIT_WEIGHT)
-        if limits is not problem.limits:
-            problem = replace(problem, limits=limits)
-        elif contact_weight_of(problem.tasks) is None:
-            problem = _softened(problem, SOFT_CONTACT_WEIGHT)
-        else:
-            return None
-        other = self._with_problem(problem)
-        other._softened = True
-        return other
-
     def _attempt(
         self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
     ) -> Command | None:
         """Return the command of this controller alone, or None if there is no solution."""
-        tick, q_array, v_array = self._compiled, numeric_copy(q), numeric_copy(v)
+        tick = self._compiled
+        q_array, v_array = numeric_copy(q), numeric_copy(v)
         if tick is None or q_array is None or v_array is None:
             return self._reference_attempt(q, v, t, targets)
         answer = tick(q_array, v_array, t, targets)
@@ -502,18 +500,18 @@ class WholeBodyController:
         result.setflags(write=False)
         targets_of_tick = inputs.packed[: tick.layout.size]
         targets_of_tick.setflags(write=False)  # not `packed` itself: numba compiles for each kind
-        solution = partial(self._solution_of, q_array, v_array, t, result, n_active, inputs)
+        problem = self._problem
         return Command(
-            result[tick.tau],
-            result[tick.qdd],
-            result[tick.forces],
-            self.contacts,
-            "compiled",
-            solution,
-            self._softened,
-            targets_of_tick,
-            tick.layout.names,
-            self._problem.limits.joint_limits,
+            tau=result[tick.tau],
+            qdd=result[tick.qdd],
+            forces=result[tick.forces],
+            contacts=problem.contacts,
+            backend="compiled",
+            solution=partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
+            softened=self._softened,
+            target_values=targets_of_tick,
+            target_entries=tick.layout.names,
+            joint_limits=problem.limits.joint_limits,
         )
 
     def _reference_attempt(
@@ -535,11 +533,18 @@ class WholeBodyController:
         solution = problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
         if values is None:
             values = self._layout.at(t) if self._layout.varies else self._layout.constant
-        tau, qdd, forces = (read_only(solution[block]) for block in ("tau", "qdd", "forces"))
         return Command(
-            tau, qdd, forces, self.contacts, "reference", solution, self._softened,
-            read_only(values), self._layout.names, self._problem.limits.joint_limits,
-        )  # fmt: skip
+            tau=read_only(solution["tau"]),
+            qdd=read_only(solution["qdd"]),
+            forces=read_only(solution["forces"]),
+            contacts=self.contacts,
+            backend="reference",
+            solution=solution,
+            softened=self._softened,
+            target_values=read_only(values),
+            target_entries=self._layout.names,
+            joint_limits=self._problem.limits.joint_limits,
+        )
 
     def _solution_of(
         self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs

@@ -331,7 +331,9 @@ def assemble_qp(
         blocks_of_G.append((inequality.block, G_user, h_user))
         names += inequality.labels(len(G_user))
         weights += [inequality.weight] * len(h_user)
-    G, h, row = np.zeros((len(names), n)), np.concatenate([part[2] for part in blocks_of_G]), 0
+    G = np.zeros((len(names), n))
+    h = np.concatenate([part[2] for part in blocks_of_G])
+    row = 0
     for each, G_part, _ in blocks_of_G:
         G[row : row + len(G_part), blocks[each]] = G_part
         row += len(G_part)

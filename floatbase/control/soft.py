@@ -10,13 +10,7 @@ import numpy as np
 
 from floatbase._validation import Array, Value, as_positive, read_only
 from floatbase.affine import Affine
-from floatbase.dynamics import (
-    Block,
-    Contacts,
-    EquationsOfMotion,
-    FrictionContact,
-    MotionConstraint,
-)
+from floatbase.dynamics import Block, Contacts, EquationsOfMotion, FrictionContact, MotionConstraint
 from floatbase.objectives import Task
 from floatbase.robots import State
 

@@ -20,11 +20,7 @@ from floatbase.dynamics.contact import (
 )
 from floatbase.dynamics.contacts import Contacts, constraint_and_jacobian
 from floatbase.dynamics.equations import Block, EquationsOfMotion, equations_of_motion
-from floatbase.dynamics.fictitious import (
-    bias_forces,
-    coriolis_matrix,
-    view_from_rotating_frame,
-)
+from floatbase.dynamics.fictitious import bias_forces, coriolis_matrix, view_from_rotating_frame
 from floatbase.dynamics.subspace import (
     FeasibleSpace,
     accelerations_from_torques,

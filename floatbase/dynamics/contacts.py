@@ -333,10 +333,8 @@ class Contacts(Value):
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
-        A, b = (
-            self._stacked(state, [part[0] for part in parts]),
-            np.concatenate([np.zeros(0), *(part[1] for part in parts)]),
-        )
+        A = self._stacked(state, [part[0] for part in parts])
+        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
         return (
             A
             if all(J is A for A, _, J in parts)
@@ -510,9 +508,8 @@ def constraint_and_jacobian(
     InputError
         If an array has the wrong shape.
     """
-    A, b = map(
-        read_only, contact.constraint(state, t)
-    )  # copied, since user code may reuse its arrays
+    # copied, since user code may reuse its arrays
+    A, b = map(read_only, contact.constraint(state, t))
     is_A = vars(type(contact)).get("jacobian_is_constraint", False)
     J = A if is_A else read_only(contact.jacobian(state, t))
     m, nv = len(contact.row_names), state.robot.nv

@@ -204,15 +204,11 @@ def view_from_rotating_frame(
             "omega is a function of time, so its derivative is needed as well. Pass "
             "omega_rate=lambda t: … [rad/s²]."
         )
-    omega_at, omega_rate_at = (
-        _as_function("omega", omega),
-        _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate),
-    )
-    R, start, v = (
-        _rotations(time, omega_at),
-        as_array("position", position, (3,), "m"),
-        as_array("velocity", velocity, (3,), "m/s"),
-    )
+    omega_at = _as_function("omega", omega)
+    omega_rate_at = _as_function("omega_rate", np.zeros(3) if omega_rate is None else omega_rate)
+    R = _rotations(time, omega_at)
+    start = as_array("position", position, (3,), "m")
+    v = as_array("velocity", velocity, (3,), "m/s")
     world = [[start + (t - time[0]) * v, v, omega_at(t), omega_rate_at(t)] for t in time]
     p, v_rotated, w, w_rate = np.einsum("nji,nkj->kni", R, world)  # Rᵀ x: in the axes of the frame
     p_rate = v_rotated - np.cross(w, p)

@@ -152,7 +152,9 @@ def _affine_hull(
 
     The points are those that were found in these directions.
     """
-    basis, flat, points = np.zeros((n, 0)), np.zeros((n, 0)), []
+    basis = np.zeros((n, 0))
+    flat = np.zeros((n, 0))
+    points = []
     while basis.shape[1] + flat.shape[1] < n:
         direction = (
             np.linalg.svd(np.hstack([basis, flat]))[0][:, -1]

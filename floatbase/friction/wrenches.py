@@ -54,8 +54,7 @@ class WrenchSet(Value):
     reference_point : array_like, shape (3,)
         Reference point x_c of the moments in the world frame [m].
     weight : float
-        Weight of the robot [N]. `moment_vertices` and `support_region` assume the force (0, 0,
-        weight).
+        Weight of the robot [N]. `support_region` assumes the force (0, 0, weight).
     max_normal_force : array_like, shape (P,)
         Limit of the normal force at each point, +inf for none [N]. Without limits the set is a
         cone; with a limit at every point it is bounded.
@@ -269,32 +268,6 @@ class WrenchSet(Value):
             for angle in angles
         ]
         return read_only(angles), read_only(forces)
-
-    def moment_vertices(self, force: npt.ArrayLike | None = None) -> Array:
-        """Return the vertices of the moments τ_c that are possible with a given total force.
-
-        Parameters
-        ----------
-        force : array_like, shape (3,), optional
-            Total force f_c in the world frame [N]. The default is (0, 0, weight), which carries the
-            robot.
-
-        Returns
-        -------
-        ndarray, shape (k, 3)
-            Vertices of this slice of the set, in world axes [N·m]. There are no rows if no contact
-            forces add up to the force.
-
-        Raises
-        ------
-        InputError
-            If the slice is unbounded, for example because walls that face each other can be
-            squeezed.
-        """
-        f = as_array("force", (0.0, 0.0, self.weight) if force is None else force, (3,), "N")
-        return self._slice(
-            self.rays[3:], self.rays[:3], f, (float(np.linalg.norm(f)) or 1.0) * self.max_lever_arm
-        )
 
     def support_region(self) -> Array:
         """Return the horizontal positions of the CoM at which the robot can stand still.

@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any
 from floatbase.errors import FloatbaseError
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
-from floatbase.lessons.exercises import (
-    all_exercises,
-    check,
-    own_numbers,
-    reveal,
-    show_progress,
-)
+from floatbase.lessons.exercises import all_exercises, check, own_numbers, reveal, show_progress
 from floatbase.lessons.judges import NumericJudge
 from floatbase.lessons.predictions import compare, predict, review
 from floatbase.lessons.rounding import rounded
@@ -24,7 +18,6 @@ if TYPE_CHECKING:
     from floatbase.lessons.panels import SliderPanel, live_run, push_panel, slider_panel
     from floatbase.lessons.push_recovery import (
         controller_factory,
-        draw_push_recovery,
         measured_push_recovery,
         plot_push_recovery,
     )
@@ -39,7 +32,6 @@ _LAZY = {
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
         (
-            "draw_push_recovery",
             "measured_push_recovery",
             "plot_push_recovery",
             "controller_factory",
@@ -61,7 +53,6 @@ __all__ = [
     "check",
     "compare",
     "controller_factory",
-    "draw_push_recovery",
     "hand_in",
     "import_answers",
     "joint_servo",

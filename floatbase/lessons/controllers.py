@@ -129,10 +129,8 @@ def joint_servo(
     d = as_instance("state", state, State).robot.d
     joints = slice(state.robot.nv - d, None)
     holding_torques = np.zeros(d) if tau is None else as_array("tau", tau, (d,), "N·m")
-    stiffness, damping = (
-        as_positive("stiffness", stiffness, allow_zero=True),
-        as_positive("damping", damping, allow_zero=True),
-    )
+    stiffness = as_positive("stiffness", stiffness, allow_zero=True)
+    damping = as_positive("damping", damping, allow_zero=True)
     offset = as_callable("path", path, "path(t)") if path is not None else lambda t: np.zeros(d)
 
     def controller(q: Array, v: Array, t: float) -> TorqueCommand:

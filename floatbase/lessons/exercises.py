@@ -1,7 +1,7 @@
 """Exercises that check themselves and give hints without giving the answer away.
 
-Each exercise is defined once, in the module `exercises` of its lesson, with its statement, stub,
-solution and judge. The judge computes the right value in a different way from the solution.
+Each exercise is defined once, in the module `exercises` of its lesson, with its stub, solution
+and judge. The judge computes the right value in a different way from the solution.
 """
 
 from __future__ import annotations
@@ -45,7 +45,6 @@ class Exercise:
     """Exercise of a lesson."""
 
     name: str
-    statement: str
     stub: str
     solution: str
     judge: Callable[[Any], Verdict]

@@ -19,7 +19,6 @@ from floatbase.lessons import props
 from floatbase.robots import load
 from floatbase.simulation import Push, Simulation, rollout
 from floatbase.viewer import Picture, View, Viewer, markers, prefixed, shapes
-from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED, PATCH, RGB
 
 MU = 0.7
@@ -184,9 +183,7 @@ def _cone() -> Picture:
 
 def _rod(start: Array, end: Array, colour: RGB) -> shapes.Item:
     """Return a thin line from one point to another."""
-    way = np.asarray(end, dtype=float) - start
-    length = float(np.linalg.norm(way))
-    return shapes.rod(start, geometry.rotation_with_z_axis(way / length), length, 0.004, colour)
+    return props.rod_between(start, end, 0.004, colour)
 
 
 def _outside(position: Array, centre: Array) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 NEAR_MISS = 0.02
 # an answer, and the name of the hint that it must get; "" for a right answer
 Example: TypeAlias = tuple[Any, str]
+# a known mistake: the name of its hint, the answer to which it leads, and the hint
+Mistake: TypeAlias = tuple[str, Any, str]
+# what may be wrong with an answer: the name of its hint, whether it is wrong, and the hint
+Fault: TypeAlias = tuple[str, bool | np.bool_, str]
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,16 @@ class Verdict:
 NO_ANSWER = Verdict(
     False, "There is no answer yet. Replace the placeholder by your expression.", "no_answer"
 )
+
+
+def first_fault(faults: Iterable[Fault]) -> Verdict | None:
+    """Return a verdict on the first fault of an answer, or None if it has none of them."""
+    return next((Verdict(False, text, hint) for hint, wrong, text in faults if wrong), None)
+
+
+def stopped(error: Exception) -> Verdict:
+    """Return the verdict on a learner's function that raises an exception."""
+    return Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
 
 
 def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
@@ -177,11 +191,9 @@ class NumericJudge:
         Function without arguments that computes the right value.
     praise : str
         Comment on a right answer.
-    mistakes : mapping of str to callable, optional
-        For each known mistake, by the name of its hint: a function that computes the value to which
-        the mistake leads.
-    hints : mapping of str to str, optional
-        For each known mistake: the comment on it.
+    mistakes : callable, optional
+        Function without arguments that returns a row for each known mistake: the name of its hint,
+        the value to which the mistake leads, and the hint.
     tolerance : float, optional
         Relative tolerance: two values are equal if they differ by at most this fraction of the
         largest entry of the right value [-].
@@ -191,8 +203,7 @@ class NumericJudge:
 
     right: Callable[[], Any]
     praise: str
-    mistakes: Mapping[str, Callable[[], Any]] = field(default_factory=dict)
-    hints: Mapping[str, str] = field(default_factory=dict)
+    mistakes: Callable[[], Iterable[Mistake]] = tuple
     tolerance: float = 1e-3
     is_count: bool = False
 
@@ -204,16 +215,16 @@ class NumericJudge:
             return given
         if self._equal(given, right):
             return Verdict(True, self.praise)
-        for hint, wrong in self.mistakes.items():
-            if self._equal(given, np.asarray(wrong(), dtype=np.float64)):
-                return Verdict(False, self.hints[hint], hint)
+        for hint, wrong, text in self.mistakes():
+            if self._equal(given, np.asarray(wrong, dtype=np.float64)):
+                return Verdict(False, text, hint)
         hint = self._of_any_answer(given, right)
         return Verdict(False, _GENERAL[hint], hint)
 
     def examples(self) -> Iterator[Example]:
         """Yield the right answer and one answer for each known mistake, each with its hint."""
         yield self.right(), ""
-        yield from ((wrong(), hint) for hint, wrong in self.mistakes.items())
+        yield from ((wrong, hint) for hint, wrong, _ in self.mistakes())
 
     def _of_any_answer(self, given: Array, right: Array) -> str:
         """Return the general hint, a key of `_GENERAL`, for a wrong answer of no known kind."""

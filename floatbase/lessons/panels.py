@@ -24,7 +24,7 @@ from floatbase._validation import (
 )
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, recorded_pushes
-from floatbase.simulation import Controller, LiveSimulation, Rollout, Simulation
+from floatbase.simulation import Controller, LiveSimulation, Push, Rollout, Simulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.recording import joint_limits_at, push_at
@@ -75,13 +75,8 @@ class SliderPanel(widgets.VBox):
         row = widgets.HBox([self._picture, note], layout=widgets.Layout(flex_flow="row wrap"))
         top = [note] if view is None else [row] if beside else [self._picture, note]
         super().__init__([*top, *sliders.values()])
-        self.view, self.sliders, self.note, self.beside, self.samples = (
-            view,
-            sliders,
-            note,
-            beside,
-            samples,
-        )
+        self.view, self.sliders, self.note = view, sliders, note
+        self.beside, self.samples = beside, samples
         self._draw = draw
         for slider in sliders.values():
             slider.observe(self._redraw, names="value")
@@ -179,7 +174,8 @@ def slider_panel(
 def _range_slider(name: str, bounds: Any, on_release: bool) -> widgets.FloatSlider:
     low, first, high, unit, step = _checked_range(name, bounds)
     text = name.replace("_", " ") + (f" [{unit}]" if unit else "")
-    made = _slider(text, low, first, high, step, on_release)
+    made = labelled_slider(text, low, first, high, step, on_release)
+    made.unit = unit  # of a static page's control, which has no caption
     made.layout.width = "80%"
     return made
 
@@ -199,8 +195,8 @@ def _checked_range(name: str, bounds: Any) -> tuple[float, float, float, str, fl
     )
 
 
-def _slider(
-    text: str, low: float, first: float, high: float, step: float, on_release: bool
+def labelled_slider(
+    text: str, low: float, first: float, high: float, step: float, on_release: bool = False
 ) -> widgets.FloatSlider:
     """Return a slider that shows as many decimals as its step."""
     return widgets.FloatSlider(
@@ -316,9 +312,9 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     as_instance("run", run, LiveSimulation)
     as_instance("view", view, Viewer)
     max_force = as_positive("max_force", max_force, "N")
-    force = _slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
-    towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)
-    speed = _slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05, on_release=False)
+    force = labelled_slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
+    towards = labelled_slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)
+    speed = labelled_slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05)
     speed.observe(lambda change: run.set_time_scale(change["new"]), names="value")
     line = _StatusLine(run)
 
@@ -326,7 +322,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
         if not force.value:
             line.value = "The push is 0 N. Set the force first."
             return
-        run.push(_horizontal_force(force.value, towards.value))
+        run.push(Push.horizontal(force.value, towards.value).force)
         line.show_status(
             f"pushed with {abs(force.value):.0f} N {_direction_text(force.value, towards.value)} "
             f"for 0.1 s"
@@ -407,12 +403,6 @@ def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.But
     made.on_click(pressed)
     receive_during_cells(made)
     return made
-
-
-def _horizontal_force(force: float, towards: float) -> list[float]:
-    """Return a horizontal force in a direction [°], shape (3,), world frame [N]."""
-    angle = math.radians(towards)
-    return [force * math.cos(angle), force * math.sin(angle), 0.0]
 
 
 def _direction_text(force: float, towards: float) -> str:

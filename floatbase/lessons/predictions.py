@@ -6,6 +6,7 @@ Predictions are stored in the learner's progress file and never leave this machi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ import numpy as np
 from floatbase._validation import MAX_MAGNITUDE, as_bool, as_string, numeric_copy, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.rounding import rounded
+from floatbase.lessons.rounding import rounded, rounded_decimals
 
+RESULT_MIME = "application/vnd.floatbase.result+json"  # of the result that `compare` shows
 _ANSWER_DIGITS = 6  # digits of a prediction, which is shown as it was typed
 _RIGHT = "right"
 # margins of a right prediction: fraction of the result, and of the largest of several results
@@ -23,6 +25,20 @@ _ROUNDING = 1e-6  # in the unit of the prediction
 # of this process: units of the predictions, and predictions that could not be saved
 _units: dict[str, str] = {}
 _unsaved: dict[str, dict[str, Any]] = {}
+
+
+@dataclass(frozen=True)
+class ComparedResult:
+    """Line of text that `compare` shows, with its result as data for the site and the lecture."""
+
+    text: str
+    data: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
+        return {"text/plain": self.text, RESULT_MIME: self.data}
 
 
 def predict(
@@ -94,21 +110,18 @@ def compare(name: str, value: Any) -> None:
     InputError
         If `value` is not a number, an array of numbers or a string.
     """
+    from IPython.display import display  # outside a notebook, it prints
+
     as_string("name of a prediction", name)
     result: Any = as_string("value", value) if isinstance(value, str) else _stored_result(value)
     stored = progress.predictions().get(name, {})
     known = stored | _unsaved.get(name, {})
     unit = _units.get(name, known.get("unit", ""))
     shown = value if isinstance(value, str) else format_result(value, unit)
-    if "said" not in known:
-        print(f"{name}: {shown}")
-        return
-    off = _describe_error(known["said"], result, unit)
-    if known.get("sure") and not is_right(known["said"], result, unit):
-        off = f"{off}, and you were sure" if off else "and you were sure"
-    beside = f"; you predicted {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
-    print(f"{name}: {shown}{', as you predicted' if off == _RIGHT else beside}")
-    if isinstance(value, str) or np.all(np.isfinite(result)):
+    data = {"name": name, "result": _rounded_result(result), "shown": shown}
+    beside = _describe_prediction(known, result, unit) if "said" in known else ""
+    display(ComparedResult(f"{name}: {shown}{beside}", data))
+    if "said" in known and (isinstance(value, str) or np.all(np.isfinite(result))):
         _save(name, {"is": result}, stored)
 
 
@@ -129,37 +142,48 @@ def review(lesson: str = "") -> None:
     known = {
         name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})
     }
-    rows = [("", "you predicted", "result", "")]
-    known = dict(sorted(known.items(), key=lambda item: not _is_sure_and_wrong(item[1])))
-    counted: dict[bool, list[bool]] = {True: [], False: []}  # by confidence: which were right
-    for name, entry in known.items():
-        if "said" in entry and lesson in ("", name, name.split(".")[0]):
-            said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
-            shown, off = (
-                ("not shown yet", "")
-                if result is None
-                else (format_result(result, unit), _describe_error(said, result, unit))
-            )
-            if "sure" in entry and result is not None:
-                counted[entry["sure"]].append(is_right(said, result, unit))
-            if _is_sure_and_wrong(entry):
-                off = f"{off}, sure" if off else "sure"
-            rows.append((name, _format_answer(said, unit), shown, off))
-    if len(rows) == 1:
+    shown = {
+        name: entry
+        for name, entry in known.items()
+        if "said" in entry and lesson in ("", name, name.split(".")[0])
+    }
+    if not shown:
         print(f"There are no predictions{f' in lesson {lesson}' if lesson else ''} yet.")
         return
+    ordered = sorted(shown.items(), key=lambda item: not _is_sure_and_wrong(item[1]))
+    rows = [_review_row(name, entry) for name, entry in ordered]
+    print(aligned([("", "you predicted", "result", ""), *rows], "   "))
+    if calibration := _calibration(list(shown.values())):
+        print(f"You were right {calibration}.")
+
+
+def _review_row(name: str, entry: dict[str, Any]) -> tuple[str, str, str, str]:
+    """Return name, prediction, result, and how far off the prediction was."""
+    said, result, unit = entry["said"], entry.get("is"), entry.get("unit", "")
+    if result is None:
+        return name, _format_answer(said, unit), "not shown yet", ""
+    off = _describe_error(said, result, unit)
+    if _is_sure_and_wrong(entry):
+        off = f"{off}, sure" if off else "sure"
+    return name, _format_answer(said, unit), format_result(result, unit), off
+
+
+def _calibration(entries: list[dict[str, Any]]) -> str:
+    """Return in words how often the learner was right, by confidence."""
+    parts = []
+    for sure, what in ((True, "when you were sure"), (False, "when you were not sure")):
+        settled = [entry for entry in entries if entry.get("sure") is sure and "is" in entry]
+        right = [is_right(entry["said"], entry["is"], entry.get("unit", "")) for entry in settled]
+        if right:
+            parts.append(f"{what} {sum(right)} of {len(right)} times")
+    return " and ".join(parts)
+
+
+def aligned(rows: Sequence[Sequence[str]], gap: str) -> str:
+    """Write rows of text as a table with columns of equal width."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        print(
-            "   ".join(f"{part:{width}}" for part, width in zip(row, widths, strict=True)).rstrip()
-        )
-    parts = [
-        f"{what} {sum(counted[sure])} of {len(counted[sure])} times"
-        for sure, what in ((True, "when you were sure"), (False, "when you were not sure"))
-        if counted[sure]
-    ]
-    if parts:
-        print(f"You were right {' and '.join(parts)}.")
+    lines = (gap.join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    return "\n".join(lines)
 
 
 def _is_sure_and_wrong(entry: dict[str, Any]) -> bool:
@@ -200,6 +224,16 @@ def lesson_name(given: str) -> str:
     if len(given) == 1:
         return f"0{given}" if given.isdigit() else given.upper()
     return given
+
+
+def _describe_prediction(known: dict[str, Any], result: Any, unit: str) -> str:
+    """Return what `compare` writes behind a result about the prediction."""
+    off = _describe_error(known["said"], result, unit)
+    if known.get("sure") and not is_right(known["said"], result, unit):
+        off = f"{off}, and you were sure" if off else "and you were sure"
+    if off == _RIGHT:
+        return ", as you predicted"
+    return f"; you predicted {_quoted_answer(known['said'], unit)}{off and f', {off}'}"
 
 
 def _describe_error(said: Any, result: Any, unit: str) -> str:
@@ -294,6 +328,16 @@ def _stored_result(value: Any) -> Any:
     whole = np.asarray(value).dtype.kind in "iu"
     kept = [int(x) if whole else float(f"{x:.6g}") for x in np.ravel(given).tolist()]
     return kept if np.ndim(given) else kept[0]
+
+
+def _rounded_result(result: Any) -> Any:
+    """Round a stored result to the digits that are shown, which are equal on all processors."""
+    if isinstance(result, str) or np.asarray(result).dtype.kind in "iu":
+        return result
+    if not np.all(np.isfinite(result)):
+        return None
+    decimals = rounded_decimals(result)
+    return [float(x) for x in decimals] if isinstance(result, list) else float(decimals)
 
 
 def format_result(value: Any, unit: str) -> str:

@@ -262,10 +262,8 @@ def from_json(kept: Any) -> Any:
 
 def _append_line(line: bytes) -> str:
     """Append a line to the file; return what went wrong, or ""."""
-    lost, advice = (
-        "Tries and predictions cannot be saved",
-        "Set FLOATBASE_HOME to a folder that you can write to",
-    )
+    lost = "Tries and predictions cannot be saved"
+    advice = "Set FLOATBASE_HOME to a folder that you can write to"
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         if not line and not path().exists():

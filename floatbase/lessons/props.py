@@ -10,7 +10,7 @@ import numpy.typing as npt
 from floatbase._geometry import rotation_z
 from floatbase._validation import as_array, as_positive, unit_vector
 from floatbase.errors import InputError
-from floatbase.viewer import Item, Picture
+from floatbase.viewer import Item, Picture, shapes
 from floatbase.viewer.scene import geometry, threejs
 from floatbase.viewer.scene.colours import MEASURED, PLANNED, RGB, WARNING
 from floatbase.viewer.scene.shapes import transform, vector_and_length
@@ -19,6 +19,29 @@ from floatbase.viewer.scene.threejs import Shape
 STEEL: RGB = (0.55, 0.58, 0.62)
 RUBBER: RGB = (0.16, 0.17, 0.18)
 WALL: RGB = (0.78, 0.76, 0.72)
+
+
+def rod_between(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, colour: RGB) -> Item:
+    """Draw a rod from one point to another.
+
+    Parameters
+    ----------
+    start, end : array_like, shape (3,)
+        The points in the world frame [m].
+    radius : float
+        Radius [m].
+    colour : tuple of float
+        Red, green and blue, from 0 to 1.
+
+    Returns
+    -------
+    Item
+        Item for `extra` of `Viewer.show`.
+    """
+    begin = np.asarray(start, dtype=np.float64)
+    way = np.asarray(end, dtype=np.float64) - begin
+    length = float(np.linalg.norm(way))
+    return shapes.rod(begin, geometry.rotation_with_z_axis(way / length), length, radius, colour)
 
 
 def wheel(

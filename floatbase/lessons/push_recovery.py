@@ -24,7 +24,6 @@ from floatbase._files import write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.simulation import PushRecovery, Simulation, push_recovery
-from floatbase.viewer import Picture
 from floatbase.viewer.plots import push_recovery_plots
 
 _FILE = Path(__file__).with_name("push_recovery.json")
@@ -86,27 +85,6 @@ def plot_push_recovery(lesson: str, axis: Axes | None = None) -> Axes:
     )
 
 
-def draw_push_recovery(lesson: str, scale: float | None = None) -> Picture:
-    """Draw the map of `plot_push_recovery` on the ground below the robot.
-
-    Parameters
-    ----------
-    lesson : str
-        Name of the lesson, such as "05".
-    scale : float, optional
-        Length of a push in the picture [m/N]. By default, the widest map is 1.5 times as wide as
-        the stance.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-    """
-    return push_recovery_plots.picture(
-        measured_push_recovery(lesson), scale, theory=False, previous=_former_push_recovery(lesson)
-    )
-
-
 def controller_factory(lesson: str) -> Callable[[], Any]:
     """Return the function that makes the controller of a push-recovery map.
 
@@ -139,10 +117,8 @@ def controller_factory(lesson: str) -> Callable[[], Any]:
 
 def measure_push_recovery(lesson: str) -> PushRecovery:
     """Measure the push-recovery map of a lesson and store it."""
-    make, watch = (
-        controller_factory(lesson),
-        getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME),
-    )
+    make = controller_factory(lesson)
+    watch = getattr(_lesson_package(lesson), "PUSH_RECOVERY_WATCH_TIME", _WATCH_TIME)
     recovery = push_recovery(
         make, directions=_DIRECTIONS, resolution=_STEP, duration=_DURATION, observation_time=watch
     )

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from floatbase.lessons.publish import NOTEBOOKS
-from floatbase.lessons.question_texts import CONTEXTS, TEXTS
+from floatbase.errors import InputError
+from floatbase.lessons.publish.workspace import lesson_notebooks
 
-_BOLD = re.compile(r"\*\*Predict (\w+\.\w+)\*\*: ?")
+# what the metadata "question" of a prediction's cell may contain, for use outside its lesson
+_METADATA = {"context": str, "text": str, "reason": str, "recall": bool, "lecture": bool}
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,9 @@ class Question:
     choices: tuple[str, ...] = ()
     unit: str = ""
     count: int = 1
+    reason: str = ""  # of the result, if the text of the lesson needs its pictures
+    recall: bool = False  # whether it can be asked again without the lesson's pictures
+    lecture: bool = False  # whether a class votes on it
 
     @property
     def lesson(self) -> str:
@@ -41,40 +45,50 @@ class Question:
         return many + (f", in {self.unit}" if self.unit else "")
 
 
-def predict_call(source: str) -> tuple[str, dict[str, Any]]:
-    """Return the name and the keyword arguments of the call of `predict` in a cell."""
-    call = next(
-        node
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
-    )
-    given = {str(keyword.arg): ast.literal_eval(keyword.value) for keyword in call.keywords}
-    return ast.literal_eval(call.args[0]), given
-
-
 @cache
 def all_questions() -> dict[str, Question]:
     """Return the predictions of all lessons, by name."""
     found = {}
-    for path in sorted(NOTEBOOKS.glob("*.ipynb")):
+    for path in lesson_notebooks().values():
         above, topic = "", ""
         for cell in json.loads(path.read_bytes())["cells"]:
             source = "".join(cell["source"])
             if cell["cell_type"] == "markdown":
                 above = source
                 topic = (re.findall(r"^#+ (.+)$", source, re.MULTILINE) or [topic])[-1]
-            elif "predict" in cell["metadata"].get("tags", []):
-                name, given = predict_call(source)
-                given["choices"] = tuple(given.get("choices", ()))
-                context, text = _question_in(above)
-                context, text = CONTEXTS.get(name, context), TEXTS.get(name, text)
-                found[name] = Question(name, topic, context, text, **given)
+            elif name := cell["metadata"].get("prediction"):
+                context, text = _question_in(above, name)
+                outside = _checked_metadata(name, cell["metadata"].get("question", {}))
+                given = {"context": context, "text": text} | _predict_arguments(source) | outside
+                found[name] = Question(name, topic, **given)
     return found
 
 
-def _question_in(text: str) -> tuple[str, str]:
+def _predict_arguments(source: str) -> dict[str, Any]:
+    """Return choices, unit and count from the call of `predict` in a cell."""
+    call = next(
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "predict"
+    )
+    given = {str(keyword.arg): ast.literal_eval(keyword.value) for keyword in call.keywords}
+    return given | {"choices": tuple(given.get("choices", ()))}
+
+
+def _checked_metadata(name: str, given: dict[str, Any]) -> dict[str, Any]:
+    for key, value in given.items():
+        if key not in _METADATA or not isinstance(value, _METADATA[key]):
+            known = ", ".join(f"{key} ({kind.__name__})" for key, kind in _METADATA.items())
+            raise InputError(
+                f"The metadata of prediction {name} has the entry {key!r}: {value!r}. "
+                f"The entries of a question are {known}."
+            )
+    return given
+
+
+def _question_in(text: str, name: str) -> tuple[str, str]:
     """Return the paragraph before a question, if it is one, and the question."""
-    before, _, question = _BOLD.split(text, maxsplit=1)
+    before, _, question = text.partition(f"**Predict {name}**:")
     paragraphs = [part for part in before.strip().split("\n\n") if part]
     last = paragraphs[-1] if paragraphs else ""
     is_text = not last.startswith(("#", "$$", "|", "<", "- "))

@@ -16,14 +16,6 @@ from floatbase.lessons.predictions import format_result, is_right, parse_answer
 from floatbase.lessons.questions import Question, all_questions
 
 PER_DAY = 3  # questions at a time
-# predictions that can be answered without the lesson's pictures
-RECALLED = (
-    "00.b", "00.c", "00.d", "01.a", "01.b", "01.d", "01.e", "01.f", "01.g", "01.h", "01.i",
-    "02.a", "02.c", "02.d", "02.i", "02.k", "03.h", "03.i", "03.j", "03.m",
-    "04.a", "04.d", "05.b", "05.c", "05.e", "06.e", "06.i", "06.j", "07.a", "07.b",
-    "07.g", "08.a", "08.b", "08.f", "08.g", "08.i", "09.c", "09.f", "09.i", "09.j",
-    "A.c", "A.d", "A.e", "C.a", "C.b", "C.c",
-)  # fmt: skip
 FIRST_PAUSE, GROWTH = timedelta(days=2), 2  # after a right answer, and how the pause grows
 MISSED_PAUSE = timedelta(days=1)  # after a wrong answer
 SURE_AND_MISSED_PAUSE = timedelta(hours=12)
@@ -137,11 +129,11 @@ def _time_of(event: dict[str, Any]) -> datetime | None:
 
 def _settled() -> dict[str, tuple[Question, Any]]:
     """Return the questions whose results the learner has seen, with these results."""
-    known, seen = all_questions(), progress.predictions()
+    seen = progress.predictions()
     return {
-        name: (known[name], seen[name]["is"])
-        for name in RECALLED
-        if name in known and "said" in seen.get(name, {}) and "is" in seen[name]
+        name: (question, seen[name]["is"])
+        for name, question in all_questions().items()
+        if question.recall and {"said", "is"} <= seen.get(name, {}).keys()
     }
 
 

@@ -54,41 +54,50 @@ def rounded(x: Any, unit: str = "", digits: int = 2, floor: float = 1e-6) -> str
     >>> rounded([0.1, 1e-12, -2.0], "N")
     '(0.1, 0, -2) N'
     """
+    unit, digits = as_string("unit", unit), as_integer("digits", digits, 1, 12)
+    floor = as_positive("floor", floor, allow_zero=True)
+    decimals = rounded_decimals(x, digits, floor)
+    if isinstance(decimals, Decimal) and not decimals.is_finite():
+        return _format_decimal(decimals)
+    return _format_nested(decimals) + (unit if unit == "°" else f" {unit}" if unit else "")
+
+
+def rounded_decimals(x: Any, digits: int = 2, floor: float = 1e-6) -> Any:
+    """Round numbers as `rounded` does, to a decimal or to nested lists of decimals."""
     numbers = numeric_copy(x)
     if numbers is None:
         raise InputError(f"x must be a number or an array of numbers, not {short_repr(x)}.")
-    unit, digits = as_string("unit", unit), as_integer("digits", digits, 1, 12)
-    floor = as_positive("floor", floor, allow_zero=True)
-    finite = np.abs(numbers[np.isfinite(numbers)])
-    if numbers.ndim == 0 and not finite.size:
-        return _format_scalar(float(numbers), digits, 0.0)
-    smallest = (
-        max(floor, min(floor, _RELATIVE_NOISE) * finite.max(initial=0.0)) if numbers.ndim else floor
-    )
-    return _format_nested(numbers.tolist(), digits, smallest) + (
-        unit if unit == "°" else f" {unit}" if unit else ""
-    )
+    largest = np.abs(numbers[np.isfinite(numbers)]).max(initial=0.0) if numbers.ndim else 0.0
+    smallest = max(floor, min(floor, _RELATIVE_NOISE) * largest)
+    return _round_nested(numbers.tolist(), digits, smallest)
 
 
-def _format_nested(numbers: Any, digits: int, smallest: float) -> str:
+def _round_nested(numbers: Any, digits: int, smallest: float) -> Any:
     if isinstance(numbers, list):
-        return f"({', '.join(_format_nested(part, digits, smallest) for part in numbers)})"
-    return _format_scalar(numbers, digits, smallest)
+        return [_round_nested(part, digits, smallest) for part in numbers]
+    if numbers == 0.0 or abs(numbers) < smallest:
+        return Decimal(0)
+    first = Decimal(f"{numbers:.{digits + _GUARD_DIGITS - 1}e}")
+    if not first.is_finite():
+        return first
+    return first.quantize(Decimal((0, (1,), first.adjusted() - digits + 1)), ROUND_HALF_UP)
 
 
-def _format_scalar(x: float, digits: int, smallest: float) -> str:
-    if np.isnan(x):
+def _format_nested(decimals: Any) -> str:
+    if isinstance(decimals, list):
+        return f"({', '.join(map(_format_nested, decimals))})"
+    return _format_decimal(decimals)
+
+
+def _format_decimal(x: Decimal) -> str:
+    if x.is_nan():
         return "not a number"
-    if np.isinf(x):
+    if x.is_infinite():
         return "infinite" if x > 0 else "minus infinite"
-    if x == 0.0 or abs(x) < smallest:
-        return "0"
-    first = Decimal(f"{x:.{digits + _GUARD_DIGITS - 1}e}")
-    quantized = first.quantize(Decimal((0, (1,), first.adjusted() - digits + 1)), ROUND_HALF_UP)
-    exponent = quantized.adjusted()
+    exponent = x.adjusted()
     if exponent in _PLAIN_EXPONENTS:
-        return _strip_trailing_zeros(f"{quantized:f}")
-    return f"{_strip_trailing_zeros(f'{quantized.scaleb(-exponent):f}')}e{exponent}"
+        return _strip_trailing_zeros(f"{x:f}")
+    return f"{_strip_trailing_zeros(f'{x.scaleb(-exponent):f}')}e{exponent}"
 
 
 def _strip_trailing_zeros(text: str) -> str:

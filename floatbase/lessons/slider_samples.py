@@ -27,12 +27,8 @@ _SAMPLES_OF_TWO = (9, 7, 6, 5)  # of each of two sliders: the first with few eno
 _ROUND_STEPS = (1.0, 2.0, 2.5, 5.0)  # times a power of ten: distance between two positions
 # fraction of that distance: a round number that is closer to a bound than this is left out
 _MIN_GAP = 0.22
-DIRECTIONS = {
-    "forwards": 0.0,
-    "to the left": 90.0,
-    "backwards": 180.0,
-    "to the right": 270.0,
-}  # degrees
+# degrees
+DIRECTIONS = {"forwards": 0.0, "to the left": 90.0, "backwards": 180.0, "to the right": 270.0}
 # s: start of a recorded push, and how long the recording goes on from then
 _PUSH_START, _TIME_SEEN = 0.1, 1.5
 _FRAME_RATE = 15.0  # pictures per second of a recorded push
@@ -148,21 +144,16 @@ def precomputed_panel(panel: SliderPanel) -> dict[str, Any]:
         pack.add_sample(place, note)
     panel.draw_at(panel.values())
     controls = [
-        _site_control(panel.sliders[name], values[name], i)
+        _site_control(name, panel.sliders[name], values[name], i)
         for name, i in zip(values, first, strict=True)
     ]
     return pack.bundle(controls, together)
 
 
-def _site_control(slider: Any, values: Sequence[float], first: int) -> Control:
+def _site_control(name: str, slider: Any, values: Sequence[float], first: int) -> Control:
     """Return the control on a static page that replaces a slider of a panel."""
-    name, _, unit = slider.description.partition(" [")
-    return Control(
-        name,
-        tuple(_format_value(x, slider.readout_format) for x in values),
-        first,
-        unit=unit.removesuffix("]"),
-    )
+    shown = tuple(_format_value(x, slider.readout_format) for x in values)
+    return Control(name.replace("_", " "), shown, first, unit=slider.unit)
 
 
 def recorded_pushes(
@@ -211,8 +202,7 @@ def recorded_pushes(
 
 def _record_push(sim: Simulation, controller: Controller, force: float, towards: float) -> Rollout:
     sim.reset()
-    angle = math.radians(towards)
-    push = Push(np.array([force * math.cos(angle), force * math.sin(angle), 0.0]), _PUSH_START, 0.1)
+    push = Push.horizontal(force, towards, _PUSH_START)
     record = rollout(sim, controller, _PUSH_START + _TIME_SEEN, [push], settling_time=0.5)
     sim.reset()
     return record

@@ -121,7 +121,8 @@ class StaticExport:
         changed = [
             self._changes(first, scene) for first, scene in zip(self._first, scenes, strict=True)
         ]
-        self._samples[",".join(map(str, at))] = [self._note_number(note), *changed]
+        number = self._notes.setdefault(note, len(self._notes))
+        self._samples[",".join(map(str, at))] = [number, *changed]
 
     def bundle(self, controls: Sequence[Control] = (), together: bool = True) -> dict[str, Any]:
         """Return the mimebundle of the display.
@@ -138,37 +139,26 @@ class StaticExport:
         dict
             The mimebundle.
         """
-        packed = base64.b64encode(
-            gzip.compress(protocol.frame(self._commands), 6, mtime=0)
-        ).decode()
+        packed = gzip.compress(protocol.frame(self._commands), 6, mtime=0)
         data = {
             **self._head, "controls": [asdict(control) for control in controls],
             "together": together, "stops": self._samples,
             "notes": list(self._notes), "keys": [list(key) for key in self._keys],
-            "commands": packed,
+            "commands": base64.b64encode(packed).decode(),
         }  # fmt: skip
         shown: dict[str, Any] = {
             MIME: data,
             "text/plain": ", ".join(map(repr, self._views)) or "a panel",
         }
         if self._thumbnails:
-            shown["image/png"] = base64.b64encode(self._image()).decode()
+            image = thumbnail.side_by_side(self._thumbnails)
+            shown["image/png"] = base64.b64encode(image).decode()
         return shown
 
-    def _image(self) -> bytes:
-        return (
-            self._thumbnails[0]
-            if len(self._thumbnails) == 1
-            else thumbnail.side_by_side(self._thumbnails)
-        )
-
-    def _note_number(self, note: str) -> int:
-        return self._notes.setdefault(note, len(self._notes))
-
     def _numbers(self, key: protocol.Key, command: bytes | None) -> tuple[int, int]:
-        number = (
-            REMOVED if command is None else self._commands.setdefault(command, len(self._commands))
-        )
+        number = REMOVED
+        if command is not None:
+            number = self._commands.setdefault(command, len(self._commands))
         return self._keys.setdefault(key, len(self._keys)), number
 
     def _changes(

@@ -14,10 +14,11 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import as_bool, as_instance, as_number
 from floatbase.errors import FloatbaseError, ViewerError, unknown_name
+from floatbase.live.settings import SETTINGS
 from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
-from floatbase.playground.panel import WALKING, Panel
+from floatbase.playground.panel import Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
 from floatbase.playground.session import PERIOD, Session
 from floatbase.playground.settings import SETTING_NAMES, Settings
@@ -152,9 +153,7 @@ class Playground:
         size = as_number("force", self.force if force is None else force, "N")
         angle = as_number("towards", self.towards if towards is None else towards, "degrees")
         self.force, self.towards = size, angle
-        angle = math.radians(self.towards)
-        force_now = self.force * np.array([math.cos(angle), math.sin(angle), 0.0])
-        self.last_push = fb.Push(force_now, frame=self.pushed_frame)
+        self.last_push = fb.Push.horizontal(size, angle, frame=self.pushed_frame)
         self.run.push(self.last_push.force, frame=self.pushed_frame)
         self._update_text()
 
@@ -354,7 +353,8 @@ class Playground:
             elif self.robot.is_floating:
                 self.view.add_text("challenge", "")
             if self._panel.has_gaits:
-                self.view.add_text("speed limit", self.session.speed_limit, WALKING)
+                section = SETTINGS["gait"].section
+                self.view.add_text("speed limit", self.session.speed_limit, section)
             self.view.add_text(
                 "code", self.session.code(self.last_push), "Python program", code=True
             )

@@ -7,71 +7,66 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from floatbase.live.settings import SETTINGS, Setting
 from floatbase.playground.challenges import CHALLENGES
 from floatbase.playground.equation import EQUATION
-from floatbase.playground.settings import GAITS, IDEAL_BANDWIDTH, Settings
+from floatbase.playground.settings import GAITS, Settings, six_digits
 from floatbase.playground.term_arrows import TERM_LEGEND
+from floatbase.robots import Foot
 
 if TYPE_CHECKING:
     from floatbase.playground.page import Playground
-
-_MAX_PUSH = 2.5  # times the weight: such a push requires steps
-_PAIRED = "model and reality"  # section of sliders with one column for each
-_STANCE = "stance"
-WALKING = "walking"
-_QP = "quadratic program"
 
 
 class _Slider(NamedTuple):
     """Slider for a number of `Settings`: an entry of a field, or the field itself."""
 
-    name: str
+    setting: Setting
     field: str
-    entry: int | None
-    low: float
-    high: float
-    step: float
-    section: str
+    entry: int | None = None
     column: str = ""
     exponent: bool = False  # whether the slider sets the power of ten
+
+    @property
+    def name(self) -> str:
+        """Name of the control."""
+        return f"{self.setting.label} {self.column}".strip()
 
     def shown(self, settings: Settings) -> float:
         """Return the slider's value for these settings, limited to its range."""
         value = getattr(settings, self.field)
         value = value if self.entry is None else value[self.entry]
-        value = math.log10(value) if self.exponent else value
-        return min(max(value, self.low), self.high)
+        value = math.log10(value) if self.exponent else six_digits(value / self.setting.scale)
+        return min(max(value, self.setting.low), self.setting.high)
+
+    def number(self, shown: float) -> float:
+        """Return the number in `Settings` for a value of the slider."""
+        return 10.0**shown if self.exponent else self.setting.scale * shown
 
 
 _PAIRED_SLIDERS = tuple(
-    _Slider(f"{name} {column}", field, index, low, high, step, _PAIRED, column)
-    for name, field, low, high, step in (
-        ("friction", "friction", 0.05, 1.5, 0.05),
-        ("slope [°]", "slope", -30.0, 30.0, 1.0),
-        ("mass [×]", "mass", 0.5, 2.0, 0.05),
-        ("motors [Hz]", "bandwidth", 1.0, IDEAL_BANDWIDTH, 1.0),
-    )
+    _Slider(SETTINGS[name], name, index, column)
+    for name in ("friction", "slope", "mass", "bandwidth")
     for index, column in enumerate(("model", "reality"))
 )
 _STANCE_SLIDERS = tuple(
-    _Slider(f"CoM {axis} [m]", "com_shift", index, -0.08, 0.08, 0.005, _STANCE)
-    for index, axis in enumerate("xyz")
+    _Slider(SETTINGS[f"com_{axis}"], "com_shift", index) for index, axis in enumerate("xyz")
 )
-_NOD_SLIDER = _Slider("nodding [rad]", "nod", None, 0.0, 0.35, 0.01, _STANCE)
-_STEP_SLIDERS = (
-    _Slider("forwards [m/s]", "velocity", 0, -0.3, 0.5, 0.05, WALKING),
-    _Slider("to the left [m/s]", "velocity", 1, -0.2, 0.2, 0.05, WALKING),
-    _Slider("turn left [rad/s]", "velocity", 2, -0.5, 0.5, 0.05, WALKING),
+_NOD_SLIDER = _Slider(SETTINGS["nodding"], "nod")
+_STEP_SLIDERS = tuple(
+    _Slider(SETTINGS[key], "velocity", index)
+    for index, key in enumerate(("velocity_x", "velocity_y", "yaw_rate"))
 )
 _QP_SLIDERS = (
-    _Slider("facets", "facets", None, 3, 16, 1, _QP),
-    _Slider("torque limits [×]", "torque_fraction", None, 0.05, 1.0, 0.05, _QP),
-    _Slider("min. force [N]", "min_normal_force", None, 0.0, 100.0, 5.0, _QP),
+    _Slider(SETTINGS["facets"], "facets"),
+    _Slider(SETTINGS["torque_limits"], "torque_fraction"),
+    _Slider(SETTINGS["normal_force"], "min_normal_force"),
     *(
-        _Slider(f"{name} ×10^", "weights", index, -3.0, 3.0, 0.5, _QP, exponent=True)
+        _Slider(SETTINGS[f"{name}_weight"], "weights", index, exponent=True)
         for index, name in enumerate(("motion", "posture", "effort"))
     ),
 )
+_PUSH, _TOWARDS, _LIFT, _GAIT = (SETTINGS[key] for key in ("push", "towards", "lift", "gait"))
 _SWITCH_WORDS = {"assumed_off": "model", "actual_off": "reality"}  # texts on the switches
 _FREE_PLAY = "free play"
 
@@ -95,25 +90,27 @@ class Panel:
         view.add_button("reset everything", play.reset_all)
         view.add_text("invitation", self._invitation)
         view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
-        most = _MAX_PUSH * play.robot.weight
-        view.add_slider("push [N]", self._push, play.force, 0.0, most, 1.0, on_release=True)
+        most = _PUSH.high * play.robot.weight
+        view.add_slider(
+            _PUSH.label, self._push, play.force, _PUSH.low, most, _PUSH.step, on_release=True
+        )
         towards = partial(setattr, play, "towards")
-        view.add_slider("towards [°]", towards, play.towards, -180.0, 180.0, 5.0)
+        view.add_slider(_TOWARDS.label, towards, play.towards, *_TOWARDS.range)
         if not play.robot.is_floating:
             return
         settings = play.session.settings
         self._add_challenges()
         self._add_sliders(_PAIRED_SLIDERS)
         for foot in play.robot.feet:
-            changed = partial(self._set_foot_contact, foot.frame)
-            stands = foot.frame not in settings.lifted_feet
-            view.add_checkbox(f"stand on {foot.frame}", changed, stands, _STANCE)
+            changed = partial(self._lift, foot.frame)
+            is_lifted = foot.frame in settings.lifted_feet
+            view.add_checkbox(_lift_name(foot), changed, is_lifted, _LIFT.section)
         self._add_sliders(_STANCE_SLIDERS)
         self._add_slider(_NOD_SLIDER, play.set_nodding)
         if self.has_gaits:
             choices = ["stand", "step when pushed", *self._gait_names]
             number = self._gait_number(settings)
-            view.add_dropdown("gait", self._set_gait, choices, number, WALKING)
+            view.add_dropdown(_GAIT.label, self._set_gait, choices, number, _GAIT.section)
             self._add_sliders(_STEP_SLIDERS)
         self._add_sliders(_QP_SLIDERS)
         self._add_terms()
@@ -125,11 +122,11 @@ class Panel:
 
     def _add_slider(self, slider: _Slider, changed: Callable[[float], None]) -> None:
         """Add one slider."""
-        name, _, _, low, high, step, section, column, _ = slider
-        value = slider.shown(self._playground.session.settings)
+        setting, value = slider.setting, slider.shown(self._playground.session.settings)
         at_most = "ideal" if slider.field == "bandwidth" else ""
+        place = setting.section, slider.column
         self._playground.view.add_slider(
-            name, changed, value, low, high, step, section, column, at_most
+            slider.name, changed, value, *setting.range, *place, at_most
         )
 
     def _add_challenges(self) -> None:
@@ -197,7 +194,7 @@ class Panel:
 
     def _set_number(self, slider: _Slider, value: float) -> None:
         """Set the number of a slider."""
-        value = 10.0**value if slider.exponent else value
+        value = slider.number(value)
         if slider.entry is None:
             whole = slider.field == "facets"
             self._playground.set(**{slider.field: round(value) if whole else value})
@@ -206,10 +203,10 @@ class Panel:
         values[slider.entry] = value
         self._playground.set(**{slider.field: tuple(values)})
 
-    def _set_foot_contact(self, foot: str, stands: bool) -> None:
-        """Put a foot on the ground, or lift it."""
+    def _lift(self, foot: str, lift: bool) -> None:
+        """Lift a foot, or put it on the ground."""
         lifted = [name for name in self._playground.pending_settings.lifted_feet if name != foot]
-        self._playground.set(lifted_feet=tuple(lifted if stands else [*lifted, foot]))
+        self._playground.set(lifted_feet=tuple([*lifted, foot] if lift else lifted))
 
     def _set_gait(self, number: int) -> None:
         """Select a gait, standing, or stepping when pushed."""
@@ -230,8 +227,8 @@ class Panel:
         play = self._playground
         values: dict[str, Any] = {
             "speed": speed,
-            "push [N]": play.force,
-            "towards [°]": play.towards,
+            _PUSH.label: play.force,
+            _TOWARDS.label: play.towards,
         }
         if play.robot.is_floating:
             values |= {f"show {term.name}": play.shown_terms[term.name] for term in EQUATION}
@@ -246,12 +243,17 @@ class Panel:
         values: dict[str, Any] = {}
         if self._gait_names:
             sliders += _STEP_SLIDERS
-            values["gait"] = self._gait_number(settings)
+            values[_GAIT.label] = self._gait_number(settings)
         values |= {slider.name: slider.shown(settings) for slider in sliders}
         for foot in self._playground.robot.feet:
-            values[f"stand on {foot.frame}"] = foot.frame not in settings.lifted_feet
+            values[_lift_name(foot)] = foot.frame in settings.lifted_feet
         for term in EQUATION:
             for field, switch in term.switches.items():
                 values[switch] = term.name not in getattr(settings, field)
         for name, value in values.items():
             self._playground.view.set_control_value(name, value)
+
+
+def _lift_name(foot: Foot) -> str:
+    """Return the name of the control that lifts a foot."""
+    return f"{_LIFT.label} {foot.frame}"

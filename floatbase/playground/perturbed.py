@@ -175,9 +175,8 @@ class PerturbedSimulation(Simulation):
         if self._base_wrench.any():
             R = np.empty(9)
             mujoco.mju_quat2Mat(R, data.qpos[3:7])
-            applied[:3] += (
-                R.reshape(3, 3) @ self._base_wrench[:3]
-            )  # MuJoCo: linear in the world frame, angular in the base frame
+            # MuJoCo: linear in the world frame, angular in the base frame
+            applied[:3] += R.reshape(3, 3) @ self._base_wrench[:3]
             applied[3:6] += self._base_wrench[3:]
         super().advance(tau, pushes)
 

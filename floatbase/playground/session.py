@@ -180,11 +180,9 @@ class Session:
                 gait = build.gait(settings, self.robot)
             with warnings.catch_warnings():  # the speed may be limited; each slider would warn
                 warnings.simplefilter("ignore", SimulationWarning)
-                walk.gait, walk.velocity, walk.yaw_rate = (
-                    gait,
-                    settings.velocity[:2],
-                    settings.velocity[2],
-                )
+                walk.gait = gait
+                walk.velocity = settings.velocity[:2]
+                walk.yaw_rate = settings.velocity[2]
         else:
             self.controller = build.controller(
                 settings, self.robot, self.sim, self._standing_state_here()

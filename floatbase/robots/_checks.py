@@ -43,9 +43,8 @@ def clamp_to_limits(model: pin.Model, q: Array) -> Array:
     joints, index, lower, upper = joint_limits(model)
     clamped, nearest = np.array(q), np.clip(q[index], lower, upper)
     excess = q[index] - nearest
-    unwrapped = q[index] - 2.0 * np.pi * np.sign(excess) * np.ceil(
-        np.abs(excess) / (2.0 * np.pi)
-    )  # the least number of turns
+    # the least number of turns
+    unwrapped = q[index] - 2.0 * np.pi * np.sign(excess) * np.ceil(np.abs(excess) / (2.0 * np.pi))
     is_revolute = np.array(
         [model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()],
         dtype=bool,
@@ -99,10 +98,8 @@ def check_unit_norms(
         part = slice(model.idx_qs[i] + translations, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
         if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_NORM_TOLERANCE:
-            entries, numbers = (
-                f"{name}[{part.start}:{part.stop}]",
-                "pair (cos, sin)" if len(q[part]) == 2 else "quaternion",
-            )
+            entries = f"{name}[{part.start}:{part.stop}]"
+            numbers = "pair (cos, sin)" if len(q[part]) == 2 else "quaternion"
             floating = i == 1 and translations == 3
             entries = (
                 f"The base quaternion {entries} (x y z w)"

@@ -29,9 +29,8 @@ def _ball_feet(
     return tuple(Foot(frame, radius, np.array(centre)) for frame in frames)
 
 
-_TALOS_SOLE = np.array(
-    [[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]]
-)  # of talos
+# of talos
+_TALOS_SOLE = np.array([[0.1, 0.06, 0.0], [0.1, -0.06, 0.0], [-0.1, -0.06, 0.0], [-0.1, 0.06, 0.0]])
 _G1_SOLE = np.array(
     [[0.12, 0.03, -0.035], [0.12, -0.03, -0.035], [-0.05, -0.025, -0.035], [-0.05, 0.025, -0.035]]
 )

@@ -39,10 +39,8 @@ from floatbase.robots.urdf import (
     without_world_link,
 )
 
-PLATE_SIZE = (
-    0.4,
-    0.03,
-)  # width and thickness, m, of the plate on which `with_floating_base` places a robot
+# width and thickness, m, of the plate on which `with_floating_base` places a robot
+PLATE_SIZE = (0.4, 0.03)
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
@@ -117,10 +115,8 @@ def load(
     """
     import example_robot_data as data
 
-    loader, entry = (
-        _find_loader(name, data.robots_loader.ROBOTS),
-        CATALOGUE.get(name, CatalogueEntry("")),
-    )
+    loader = _find_loader(name, data.robots_loader.ROBOTS)
+    entry = CATALOGUE.get(name, CatalogueEntry(""))
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
     root = Path(data.getModelPath(path)).resolve()
     urdf = read_urdf(root / path)
@@ -130,9 +126,8 @@ def load(
         if loader.srdf_filename
         else None
     )
-    start = _reference_posture(
-        model, loader, srdf, entry
-    )  # also if a posture is given, since it reads the rotor inertias
+    # also if a posture is given, since it reads the rotor inertias
+    start = _reference_posture(model, loader, srdf, entry)
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
     if feet is None:
@@ -220,10 +215,8 @@ def load_urdf(
         If the motors of a fixed-base robot are too weak to hold its posture, or if no posture is
         given and a leg of a floating-base robot is straight or otherwise singular.
     """
-    urdf, directories = (
-        as_string("path", str(path) if isinstance(path, Path) else path),
-        _as_directories(package_dirs),
-    )
+    urdf = as_string("path", str(path) if isinstance(path, Path) else path)
+    directories = _as_directories(package_dirs)
     as_bool("floating", floating)
     is_text = urdf.lstrip(_WHITESPACE).startswith("<")
     name = as_string("name", name) if name is not None else "robot" if is_text else Path(urdf).stem
@@ -488,9 +481,8 @@ def _limb_ends(model: pin.Model) -> list[str]:
     """
     frames, parent_joints = model.frames, set(model.parents)
     bodies = [frame for frame in frames if frame.type == pin.FrameType.BODY]
-    parents = {
-        frames[frames[frame.parentFrame].parentFrame].name for frame in bodies
-    }  # the parent of a link is the frame of a joint
+    # the parent of a link is the frame of a joint
+    parents = {frames[frames[frame.parentFrame].parentFrame].name for frame in bodies}
     return [
         str(frame.name)
         for frame in bodies

@@ -23,9 +23,8 @@ _LEAST_RISE = 1e-9  # m: a surface that is higher above the planes by less is th
 _MIN_VERTICAL = 1e-6  # smallest vertical component of the normal of a plane that has a height
 _LARGEST_STEP = 0.2  # m and rad: the Jacobian of Gauss-Newton is accurate over this distance
 
-_Planes: TypeAlias = tuple[
-    Array, Array
-]  # normals, shape (n, 3), and offsets, shape (n,), m: normal · x = offset
+# normals, shape (n, 3), and offsets, shape (n,), m: normal · x = offset
+_Planes: TypeAlias = tuple[Array, Array]
 
 
 def find_standing_state(

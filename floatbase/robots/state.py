@@ -72,8 +72,23 @@ class State(Value):
         check_unit_norms(robot.model, "q", self.q, ", or use robot.standing()")
 
     @classmethod
-    def _unchecked(cls, robot: Robot, q: Array, v: Array) -> State:
-        """Make a state from checked arrays that nothing else writes to."""
+    def unchecked(cls, robot: Robot, q: Array, v: Array) -> State:
+        """Make a state without checks, for loops that have checked the arrays.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        q : ndarray, shape (nq,)
+            Configuration, float64 and finite; nothing may write to it later.
+        v : ndarray, shape (nv,)
+            Velocity, float64 and finite; nothing may write to it later.
+
+        Returns
+        -------
+        State
+            The state.
+        """
         state = object.__new__(cls)
         vars(state).update(robot=robot, q=frozen(q.view()), v=frozen(v.view()))
         return state

@@ -23,9 +23,8 @@ _ROUNDING = 1e-12
 def read_urdf(path: Path) -> str:
     """Read the text of a URDF file."""
     try:
-        return path.read_bytes().decode(
-            "utf-8-sig", errors="replace"
-        )  # a comment in another encoding does not change the robot
+        # a comment in another encoding does not change the robot
+        return path.read_bytes().decode("utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(

@@ -22,37 +22,31 @@ class Conversion:
         self._robot = robot
         self._n_base = 6 if robot.is_floating else 0
         mujoco_ids = [model.joint(name).id for name in robot.joint_names]
-        self._qpos_indices, self._qvel_indices = (
-            model.jnt_qposadr[mujoco_ids],
-            model.jnt_dofadr[mujoco_ids],
-        )
+        self._qpos_indices = model.jnt_qposadr[mujoco_ids]
+        self._qvel_indices = model.jnt_dofadr[mujoco_ids]
         joint_ids = [robot.model.getJointId(name) for name in robot.joint_names]
         self._q_indices = np.array(robot.model.idx_qs)[joint_ids]
-        self._is_continuous = (
-            np.array(robot.model.nqs)[joint_ids] == 2
-        )  # Pinocchio stores the angle of such a joint as (cos, sin)
+        # Pinocchio stores the angle of such a joint as (cos, sin)
+        self._is_continuous = np.array(robot.model.nqs)[joint_ids] == 2
         self._cos_indices = self._q_indices[self._is_continuous]
         base = [0, 1, 2, 4, 5, 6, 3] if self._n_base else []
-        self._qpos_of_q = np.array(
-            base + [0] * (robot.nq - len(base)), dtype=int
-        )  # index in qpos of each entry of q
-        self._qpos_of_q[self._q_indices] = self._qpos_indices
-        self._qpos_of_q[self._cos_indices + 1] = self._qpos_indices[self._is_continuous]
-        self._qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
+        # index in qpos of each entry of q
+        self.qpos_of_q = np.array(base + [0] * (robot.nq - len(base)), dtype=int)
+        self.qpos_of_q[self._q_indices] = self._qpos_indices
+        self.qpos_of_q[self._cos_indices + 1] = self._qpos_indices[self._is_continuous]
+        self.qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
 
     def q(self, qpos: Array) -> Array:
         """Return q, shape (nq,), for MuJoCo's qpos."""
-        q: Array = qpos[self._qpos_of_q]
+        q: Array = qpos[self.qpos_of_q]
         if self._cos_indices.size:
-            q[self._cos_indices], q[self._cos_indices + 1] = (
-                np.cos(q[self._cos_indices]),
-                np.sin(q[self._cos_indices + 1]),
-            )
+            q[self._cos_indices] = np.cos(q[self._cos_indices])
+            q[self._cos_indices + 1] = np.sin(q[self._cos_indices + 1])
         return q
 
     def v(self, qpos: Array, qvel: Array) -> Array:
         """Return v, shape (nv,), for MuJoCo's qpos and qvel."""
-        v: Array = qvel[self._qvel_of_v]
+        v: Array = qvel[self.qvel_of_v]
         if self._n_base:
             v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
         return v

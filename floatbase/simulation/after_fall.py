@@ -4,25 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from floatbase._validation import Array, read_only
+from floatbase._validation import read_only
 from floatbase.dynamics import Contacts
+from floatbase.simulation.damping import joint_damping
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
 from floatbase.simulation.record import Recorder, Rollout
 
-# s: time constant with which the damping stops a joint if nothing else moves it
-_DAMPING_TIME_CONSTANT = 0.05
 _REST_SPEED = 0.05  # m/s and rad/s: a robot that is slower counts as at rest
-
-
-def joint_damping(sim: Simulation, period: float) -> Array:
-    """Return the damping that each motor applies, shape (d,) [N·m·s/rad].
-
-    The damping is the joint's effective inertia in the present state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05
-    s.
-    """
-    inverse_inertia = np.diag(np.linalg.inv(sim.state.M))[sim.robot.nv - sim.robot.d :]
-    return np.array(1.0 / (max(_DAMPING_TIME_CONSTANT, 2.0 * period) * inverse_inertia))
 
 
 def record_settling(
@@ -37,7 +26,7 @@ def record_settling(
     if not ticks:
         return
     record.enable_link_collisions()
-    damping = joint_damping(sim, substeps * sim.timestep)
+    damping = joint_damping(sim.state, substeps * sim.timestep)
     for _ in range(ticks):
         record.before_tick(sim.time, sim.q, sim.v)
         tau = read_only(-damping * sim.joint_state[1])

@@ -78,10 +78,9 @@ def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
     spec.option.impratio = _IMPEDANCE_RATIO
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     contact = spec.default.geom
-    contact.condim, contact.friction = (
-        3,
-        [ground.mu, 0.0, 0.0],
-    )  # no torsional or rolling friction
+    # no torsional or rolling friction
+    contact.condim = 3
+    contact.friction = [ground.mu, 0.0, 0.0]
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
@@ -160,26 +159,27 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
     for body in bodies:
         inertia = inertias.get(body.name, pin.Inertia.Zero())
         tensor, body.explicitinertial = inertia.inertia, body.name in inertias
-        body.mass, body.ipos, body.iquat = inertia.mass, inertia.lever, [1.0, 0.0, 0.0, 0.0]
-        diagonal = (
-            tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
-        )  # how MuJoCo marks a missing inertia
+        body.mass = inertia.mass
+        body.ipos = inertia.lever
+        body.iquat = [1.0, 0.0, 0.0, 0.0]
+        # how MuJoCo marks a missing inertia
+        diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
 
 
 def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
     """Return the URDF's inertia of a body and all links welded below it, in the body's frame."""
-    inertia = (
-        pin.Inertia.Zero()
-    )  # the constructor rejects tensors that are not positive definite, but their sum may be so
+    # the constructor rejects tensors that are not positive definite, but their sum may be so
+    inertia = pin.Inertia.Zero()
     if body.explicitinertial:  # else the URDF gives none
-        ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(
-            body.fullinertia
-        )  # MuJoCo stores NaN for a tensor of zeros
+        # MuJoCo stores NaN for a tensor of zeros
+        ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(body.fullinertia)
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
         tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
-        inertia.mass, inertia.lever, inertia.inertia = float(body.mass), np.array(body.ipos), tensor
+        inertia.mass = float(body.mass)
+        inertia.lever = np.array(body.ipos)
+        inertia.inertia = tensor
     for child in body.bodies:
         if not child.joints:
             inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(
@@ -244,8 +244,8 @@ def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
         hull = body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, name=mesh.name, mass=0.0
         )
-        hull.contype, hull.conaffinity, hull.priority = 0, 1, 1
-        hull.solref = [
-            -1.0 / (impact_time * _PENETRATION_RECOVERY_TIME),
-            -1.0 / impact_time,
-        ]  # stiffness and damping for 1 kg, overdamped
+        hull.contype = 0
+        hull.conaffinity = 1
+        hull.priority = 1
+        # stiffness and damping for 1 kg, overdamped
+        hull.solref = [-1.0 / (impact_time * _PENETRATION_RECOVERY_TIME), -1.0 / impact_time]

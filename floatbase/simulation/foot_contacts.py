@@ -31,7 +31,9 @@ class FootContacts:
         self, model: mujoco.MjModel, data: mujoco.MjData, link_collisions: bool
     ) -> tuple[npt.NDArray[np.int32], Array]:
         """Return the n contacts of the feet at this instant."""
-        contact, forces, n_limits = data.contact, data.efc_force, data.nl
+        contact = data.contact
+        forces = data.efc_force
+        n_limits = data.nl
         if n_limits:  # the contacts follow the joints that are at their limits
             forces = forces[n_limits:]
         geoms = contact.geom  # from the plane to a ball or a link; a ball comes before a box
@@ -72,7 +74,9 @@ class FootContacts:
 
     def forces(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
         """Return the forces on the contact points at N instants."""
-        n, planes, foot_geoms = len(geoms), geoms[:, :, 0], geoms[:, :, 1]
+        n = len(geoms)
+        planes = geoms[:, :, 0]
+        foot_geoms = geoms[:, :, 1]
         forces = np.zeros((n, len(self._is_foot), 3))
         per_contact = contact_frame_forces.reshape(*foot_geoms.shape, 3)
         for plane, frame in enumerate(self._contact_frames):

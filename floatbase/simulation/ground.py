@@ -189,9 +189,13 @@ class Ground(Value):
         edges = as_number("start", start, "m") + run * np.arange(n)
         # boxes that touch but do not overlap: coplanar contacts would count twice
         if rise > 0.0:
-            ends, first, floor = np.append(edges, edges[-1] + _PLATFORM), 1, 0.0
+            ends = np.append(edges, edges[-1] + _PLATFORM)
+            first = 1
+            floor = 0.0
         else:
-            ends, first, floor = np.insert(edges, 0, edges[0] - _PLATFORM), 0, rise * n
+            ends = np.insert(edges, 0, edges[0] - _PLATFORM)
+            first = 0
+            floor = rise * n
         side = np.array([-0.5 * width, 0.5 * width])
         boxes = [Box(ends[i : i + 2], side, rise * (first + i)) for i in range(n)]
         return cls(mu, offset=floor, boxes=boxes)

@@ -69,9 +69,8 @@ def _collision_objects(robot: Robot) -> list[Any]:
 def _read_geometry(robot: Robot, root: ElementTree.Element) -> list[Any]:
     """Return the collision shapes of a URDF; a missing mesh file raises `ValueError`."""
     urdf = ElementTree.tostring(root, encoding="unicode")
-    loader = coal.CachedMeshLoader(
-        coal.BV_OBB
-    )  # legs share files; Python cannot read the vertices of other kinds of trees
+    # legs share files; Python cannot read the vertices of other kinds of trees
+    loader = coal.CachedMeshLoader(coal.BV_OBB)
     folders = [str(folder) for folder in robot.package_dirs]
     return list(
         pin.buildGeomFromUrdfString(

@@ -18,9 +18,8 @@ from floatbase.simulation.push import Push, active_pushes
 from floatbase.simulation.record import Outcome, Rollout
 from floatbase.simulation.rollout import Actuators, Controller, check_actuators, rollout
 
-_SLICE_DURATION = (
-    1.0 / 30.0
-)  # s of simulated time in a slice, roughly: as often as a picture is drawn
+# s of simulated time in a slice, roughly: as often as a picture is drawn
+_SLICE_DURATION = 1.0 / 30.0
 _JOIN_TIMEOUT = 5.0  # s that `close` waits for a slice: far longer than one takes
 _MAX_SETTLING_TIME = 1.5  # s, at most, after a fall until the robot lies still
 Status = Literal["running", "paused", "idle", "fell", "diverged", "controller failed", "stopped"]
@@ -82,12 +81,10 @@ class LiveSimulation:
         if after_reset is not None:
             as_callable("after_reset", after_reset, "after_reset()")
         self.error: Exception | None = None
-        self._controller, self._show, self._actuators, self._after_reset = (
-            controller,
-            show,
-            actuators,
-            after_reset,
-        )
+        self._controller = controller
+        self._show = show
+        self._actuators = actuators
+        self._after_reset = after_reset
         self._period = as_positive("control_period", control_period, "s")
         self._slice_duration = _slice_duration_for(self._period)  # s
         self._idle_timeout = as_positive("idle_timeout", idle_timeout, "s")
@@ -277,7 +274,9 @@ class LiveSimulation:
 
     def _set_status(self, status: Status, reason: str = "") -> bool:
         """Set the status, and return whether it changed."""
-        previous, self._status, self._reason = self._status, status, reason
+        previous = self._status
+        self._status = status
+        self._reason = reason
         return previous != status
 
     def _notify(self, changed: bool) -> None:

@@ -28,22 +28,22 @@ from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
 from floatbase.simulation.build import body_name, build_model
+from floatbase.simulation.damping import joint_damping
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.ground import Ground
+from floatbase.simulation.page_data import model_data
 from floatbase.simulation.push import Push, as_pushes
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
 FALLEN_HEIGHT_FRACTION = 0.4
-FALLEN_COSINE = float(
-    np.cos(np.deg2rad(60.0))
-)  # of the base's tilt since the last reset: no leg can recover from more
+# of the base's tilt since the last reset: no leg can recover from more
+FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
 _ROUNDING = 1e-9  # m: a foot on the ground may be this far below it
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
-_FIRST_FATAL_WARNING = int(
-    mujoco.mjtWarning.mjWARN_BADQPOS
-)  # after this warning of MuJoCo or a later one, its numbers are meaningless
+# after this warning of MuJoCo or a later one, its numbers are meaningless
+_FIRST_FATAL_WARNING = int(mujoco.mjtWarning.mjWARN_BADQPOS)
 
 
 class Simulation:
@@ -122,15 +122,11 @@ class Simulation:
     def _refresh_views(self) -> None:
         """Keep views into MuJoCo's memory for values of each step: asking MuJoCo takes longer."""
         data = self.data
-        self._qpos, self._qvel, self._warnings = (
-            data.qpos,
-            data.qvel,
-            data.warning.number[_FIRST_FATAL_WARNING:],
-        )
-        self._base_position, self._base_vertical = (
-            data.xpos[self._base_body],
-            data.xmat[self._base_body, 2::3],
-        )  # origin and z axis
+        self._qpos = data.qpos
+        self._qvel = data.qvel
+        self._warnings = data.warning.number[_FIRST_FATAL_WARNING:]
+        self._base_position = data.xpos[self._base_body]  # of its origin
+        self._base_vertical = data.xmat[self._base_body, 2::3]  # its z axis
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_thread_lock"}
@@ -465,15 +461,45 @@ class Simulation:
             f"ground there. Push a link that moves: {moving}."
         )
 
+    def page_data(self) -> dict[str, Any]:
+        """Return the model in its present state, as data for the robot in a web page.
+
+        Returns
+        -------
+        dict
+            Values for JSON, named as in the page's JavaScript: MuJoCo's model as XML, where MuJoCo
+            keeps what the robot has in its own order, and the limits of `fallen`.
+        """
+        robot, model, conversion = self.robot, self.model, self._conversion
+        joints = [model.joint(name) for name in robot.joint_names]
+        base = [self._base_body] if robot.is_floating else []
+        return {
+            **model_data(robot, self.ground, self.timestep, model),
+            "fallenHeight": FALLEN_HEIGHT_FRACTION,
+            "fallenCosine": FALLEN_COSINE,
+            "home": {"qpos": self._qpos.tolist(), "com": self.state.com.tolist()},
+            # in the package's order: entries of qpos and qvel, bodies that joints move, joints
+            "qposOfQ": conversion.qpos_of_q.tolist(),
+            "qvelOfV": conversion.qvel_of_v.tolist(),
+            "bodies": [0, *base, *(int(joint.bodyid[0]) for joint in joints)],
+            "joints": [int(joint.id) for joint in joints],
+            "motors": self._actuator_ids.tolist(),
+            "damping": joint_damping(self.state, self.timestep).tolist(),
+            "hulls": self._hull_geoms.tolist(),
+            "hullBodies": self._hull_bodies.tolist(),
+            "points": [
+                {"name": name, "geom": int(geom), "radius": float(model.geom_size[geom, 0])}
+                for name, geom in zip(self.point_names, self.foot_contacts.geoms, strict=True)
+            ],
+        }
+
     def _apply_push(self, push: Push, force: Array) -> None:
         """Apply a force at the origin of a push's frame.
 
         MuJoCo applies forces at the body's centre of mass, so a moment is added.
         """
-        frame, body = (
-            self.robot.model.frames[self.robot.frame_id(push.frame)],
-            self.pushed_body(push),
-        )
+        frame = self.robot.model.frames[self.robot.frame_id(push.frame)]
+        body = self.pushed_body(push)
         position = (
             self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ frame.placement.translation
         )

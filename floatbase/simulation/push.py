@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -52,6 +53,50 @@ class Push(Value):
     start: float = field(default=0.0, metadata=checked(as_positive, "s", allow_zero=True))
     duration: float = field(default=0.1, metadata=checked(as_positive, "s"))
     frame: str = field(default="base", metadata=checked(as_string))
+
+    @staticmethod
+    def horizontal(
+        force: float,
+        towards: float,
+        start: float = 0.0,
+        duration: float = 0.1,
+        frame: str = "base",
+    ) -> Push:
+        """Return a horizontal push with a magnitude and a direction.
+
+        Parameters
+        ----------
+        force : float
+            Magnitude of the force; a negative force pushes in the opposite direction [N].
+        towards : float
+            Direction of the push: 0 is along the world's x axis, 90 along its y axis [°].
+        start : float, optional
+            Time at which the push begins, on the simulation's clock [s].
+        duration : float, optional
+            Duration of the push [s].
+        frame : str, optional
+            Name of a frame of the robot; "base" is the base link.
+
+        Returns
+        -------
+        Push
+            The push.
+
+        Raises
+        ------
+        InputError
+            If an argument is not a number or out of range.
+
+        Examples
+        --------
+        >>> import floatbase as fb
+        >>> fb.Push.horizontal(30.0, 90.0).force.round(6)
+        array([ 0., 30.,  0.])
+        """
+        force = as_number("force", force, "N")
+        angle = math.radians(as_number("towards", towards, "degrees"))
+        vector = [force * math.cos(angle), force * math.sin(angle), 0.0]
+        return Push(vector, start, duration, frame)  # type: ignore[arg-type]
 
     def acts_at(self, t: float) -> bool:
         """Return whether the push acts at a given time.

@@ -175,7 +175,9 @@ class Rollout(Value):
     @cached_property
     def com(self) -> Array:
         """Centre of mass at each row, shape (n, 3), world frame [m]."""
-        model, data, com = self.robot.model, self.robot.model.createData(), np.empty((len(self), 3))
+        model = self.robot.model
+        data = self.robot.model.createData()
+        com = np.empty((len(self), 3))
         for row, q in zip(com, self.q, strict=True):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
@@ -268,13 +270,14 @@ class Recorder:
     """
 
     def __init__(self, sim: Simulation, stance: Contacts, ticks: int, substeps: int):
-        self._sim, self._initial_stance, self._substeps, self._n = sim, stance, substeps, 0
+        self._sim = sim
+        self._initial_stance = stance
+        self._substeps = substeps
+        self._n = 0
         d, points = sim.robot.d, len(sim.point_names)
-        self._time, self._q, self._v = (
-            np.empty(ticks),
-            np.empty((ticks, sim.robot.nq)),
-            np.empty((ticks, sim.robot.nv)),
-        )
+        self._time = np.empty(ticks)
+        self._q = np.empty((ticks, sim.robot.nq))
+        self._v = np.empty((ticks, sim.robot.nv))
         self._tau_desired = np.empty((ticks, d))
         self._planned_qdd = np.full((ticks, sim.robot.nv), np.nan)
         self._joint_limits: JointLimits | None = None
@@ -311,15 +314,15 @@ class Recorder:
         i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
         missing = len(geoms) - self._step_contact_geoms.shape[1]
         if missing > 0:  # a foot touches many boxes
-            self._step_contact_geoms, self._step_contact_forces = (
-                np.pad(self._step_contact_geoms, ((0, 0), (0, missing), (0, 0))),
-                np.pad(self._step_contact_forces, ((0, 0), (0, 3 * missing))),
+            self._step_contact_geoms = np.pad(
+                self._step_contact_geoms, ((0, 0), (0, missing), (0, 0))
+            )
+            self._step_contact_forces = np.pad(
+                self._step_contact_forces, ((0, 0), (0, 3 * missing))
             )
         self._step_actuator_forces[i] = self._actuator_forces
-        self._step_contact_geoms[i, : len(geoms)], self._step_contact_forces[i, : forces.size] = (
-            geoms,
-            forces,
-        )
+        self._step_contact_geoms[i, : len(geoms)] = geoms
+        self._step_contact_forces[i, : forces.size] = forces
         self._n_steps += 1
 
     def complete_tick(
@@ -446,7 +449,9 @@ class Recorder:
         A point contact in the middle of a flat foot has the sum of the corners' forces and the mean
         of their positions.
         """
-        sim, n, feet = self._sim, self._n, self._sim.feet
+        sim = self._sim
+        n = self._n
+        feet = self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
             sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
@@ -455,10 +460,8 @@ class Recorder:
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
-            forces, positions = (
-                np.full((n, contact.k), np.nan),
-                np.full((n, len(point_names), 3), np.nan),
-            )
+            forces = np.full((n, contact.k), np.nan)
+            positions = np.full((n, len(point_names), 3), np.nan)
             if contact.name in feet.names:
                 part = feet.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)

@@ -28,9 +28,8 @@ from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push, active_pushes, as_pushes
 from floatbase.simulation.record import Outcome, Recorder, Rollout
 
-_MAX_STEPS = (
-    10**7
-)  # of one record: three hours at 1 ms, and 10 GB; the next rollout continues where this one ends
+# of one record: three hours at 1 ms, and 10 GB; the next rollout continues where this one ends
+_MAX_STEPS = 10**7
 # fraction of a period by which a time may differ from a whole number of periods: user rounding
 _PERIOD_TOLERANCE = 1e-6
 _TIME_TOLERANCE = 1e-9  # additional fraction of the time itself: rounding over many periods
@@ -355,9 +354,8 @@ def _planned_forces(command: Any, stance: Contacts) -> Array | None:
     forces = getattr(command, "forces", None)
     if forces is None:
         return None
-    is_float64 = (
-        type(forces) is np.ndarray and forces.dtype.char == "d"
-    )  # float64 is the usual case
+    # float64 is the usual case
+    is_float64 = type(forces) is np.ndarray and forces.dtype.char == "d"
     planned = forces if is_float64 else numeric_copy(forces)
     if planned is None:
         raise InputError(f"The controller's forces must be numbers, not {short_repr(forces)}.")

@@ -6,7 +6,8 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,20 +41,8 @@ def read_sweep(path: str | Path) -> DataFrame:
     InputError
         If the file cannot be read or was not written by a sweep.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f'path must be a path, such as "rows.jsonl", not {short_repr(path)}.')
-    try:
-        if Path(path).exists() and not Path(path).is_file():  # reading a device may never end
-            raise _wrong_file_error(path, "that no sweep has written")
-        content = Path(path).read_bytes()
-    except InputError:
-        raise
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = getattr(error, "strerror", error)
-        raise InputError(
-            f"{path} cannot be read: {reason}. Give the path of a sweep's file."
-        ) from None
-    return as_frame(_read_rows(path, content))
+    with _file_errors("path", path, "cannot be read", "Give the path of a sweep's file."):
+        return as_frame(_read_rows(path, Path(path).read_bytes()))
 
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:
@@ -68,46 +57,30 @@ def as_frame(rows: Mapping[int, Row]) -> DataFrame:
 
 
 class RowStore:
-    """Rows of a sweep, as point number -> row, which are also written to a file if there is one.
+    """Rows of a sweep, as point number -> row, which are also written to a file if there is one."""
 
-    The file is in JSON Lines format: the first line describes the sweep, and each further line is a
-    completed point. The file is locked while the store is open. An incomplete last line is removed.
-    """
+    # the first line of the file describes the sweep, and each further line is a completed point;
+    # the file is locked while the store is open, and an incomplete last line is removed
 
     def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
         self.rows: dict[int, Row] = {}
-        self._path, self._points, self._file = path, points, -1
+        self._path, self._file = path, -1
         if path is None:
             return
-        if not isinstance(path, str | os.PathLike):
-            raise InputError(f'file must be a path, such as "rows.jsonl", not {short_repr(path)}.')
-        try:
-            if os.path.exists(path) and not os.path.isfile(path):
-                raise _wrong_file_error(path, "that no sweep has written")
+        with _file_errors("file", path, "cannot be written to", "Give another file."):
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._resume(path, _header(name, points))
-        except BlockingIOError:
-            self.close()
-            raise InputError(
-                f"Another sweep is writing to {path}. Wait until it ends, or give another file."
-            ) from None
-        except InputError:
-            self.close()
-            raise
-        except (OSError, ValueError) as error:  # ValueError: a null character in the path
-            self.close()
-            reason = getattr(error, "strerror", error)
-            raise InputError(f"{path} cannot be written to: {reason}. Give another file.") from None
-        except BaseException:
-            self.close()
-            raise
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._resume(path, _header(name, points), points)
+            except BaseException:
+                self.close()
+                raise
 
     def add(self, i: int, row: Row) -> None:
         """Store the row of point i, as JSON values, and write it to the file at once."""
         self.rows[i] = row
         if self._file >= 0:
-            self._write(json.dumps({"point": i, **row}))
+            self._write({"point": i, **row})
 
     def close(self) -> None:
         """Close the file and release its lock."""
@@ -115,13 +88,13 @@ class RowStore:
             os.close(self._file)
             self._file = -1
 
-    def _resume(self, path: str | Path, header: Row) -> None:
+    def _resume(self, path: str | Path, header: Row, points: Sequence[Row]) -> None:
         """Read the file after checking that it belongs to this sweep, or begin an empty one."""
         content = Path(path).read_bytes()
         complete_lines = content[: content.rfind(b"\n") + 1]
         if not complete_lines and json.dumps(header).encode().startswith(content):
             os.ftruncate(self._file, 0)
-            self._write(json.dumps(header))
+            self._write(header)
             return
         found = _read_header(path, content)
         for key, what in (
@@ -137,33 +110,48 @@ class RowStore:
             raise _wrong_file_error(path, "with the same parameters but different values")
         self.rows = _read_rows(path, complete_lines)
         for i, row in self.rows.items():
-            point = self._points[i] if 0 <= i < len(self._points) else {}
-            if not point or json.dumps({name: row.get(name) for name in point}) != json.dumps(
-                point
-            ):
+            if i not in range(len(points)) or json.dumps(row | points[i]) != json.dumps(row):
                 raise _wrong_file_error(
                     path, f"whose point {i} has other parameters, because the file was edited"
                 )
         os.ftruncate(self._file, len(complete_lines))
 
-    def _write(self, line: str) -> None:
+    def _write(self, row: Row) -> None:
         """Write a line to the file."""
-        data = line.encode() + b"\n"
-        try:
+        advice = (
+            "All earlier rows are saved. "
+            "Once the file can be written to again, run the same sweep to resume."
+        )
+        data = json.dumps(row).encode() + b"\n"
+        with _file_errors("file", self._path, "cannot be written to", advice):
             while data:  # a full disk takes only part of a line: the next attempt gives the reason
                 data = data[os.write(self._file, data) :]
-        except OSError as error:
-            raise InputError(
-                f"{self._path} cannot be written to: {error.strerror}. All earlier rows are saved. "
-                "Once the file can be written to again, run the same sweep to resume."
-            ) from None
+
+
+@contextmanager
+def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[None]:
+    """Raise `InputError` if the path is not one of a file, or if the body cannot use the file."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(
+            f'{argument} must be a path, such as "rows.jsonl", not {short_repr(path)}.'
+        )
+    try:
+        if os.path.exists(path) and not os.path.isfile(path):  # reading a device may never end
+            raise _wrong_file_error(path, "that no sweep has written")
+        yield
+    except InputError:
+        raise
+    except BlockingIOError:
+        raise InputError(
+            f"Another sweep is writing to {path}. Wait until it ends, or give another file."
+        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", error)
+        raise InputError(f"{path} {what}: {reason}. {advice}") from None
 
 
 def as_json_value(what: str, value: Any) -> Any:
-    """Convert a value to what JSON returns for it; NumPy's types become Python's.
-
-    Raises `InputError` with `what`, a name, for values that JSON cannot hold.
-    """
+    """Convert a value to what JSON returns for it; raise `InputError` that names it as `what`."""
     try:
         return json.loads(json.dumps(value, default=_from_numpy))
     except (TypeError, ValueError) as error:
@@ -219,7 +207,7 @@ def _joined(value: Any) -> str:
     return ", ".join(value) if isinstance(value, list) else str(value)
 
 
-def _wrong_file_error(path: str | Path, what: str) -> InputError:
+def _wrong_file_error(path: str | os.PathLike[str], what: str) -> InputError:
     """Return the error for a file that does not belong to this sweep."""
     return InputError(
         f"{path} is a file {what}. It was not changed. Give another file, or remove this one."

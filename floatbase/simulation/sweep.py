@@ -11,20 +11,14 @@ import traceback
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from floatbase._validation import as_bool, as_integer, short_repr, signature_error
 from floatbase.errors import InputError, SimulationError, require
-from floatbase.simulation.row_store import (
-    RESERVED_NAMES,
-    Row,
-    RowStore,
-    as_frame,
-    as_json_value,
-)
+from floatbase.simulation.row_store import RESERVED_NAMES, Row, RowStore, as_frame, as_json_value
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -38,6 +32,7 @@ _CONNECT_TIMEOUT = 10.0  # s that a Dask scheduler may take to answer
 _SINGLE_THREAD_ENV = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
+_Job = tuple[str, bytes]  # a token of the sweep, and the pickled function and setup
 
 
 def sweep(
@@ -128,32 +123,28 @@ def sweep(
             "cluster. Give one of the two."
         )
     require("pandas", "sweep")  # missing libraries are reported before hours of work
-    job, executor = _make_job(function, setup), _executor(_worker_count(workers), cluster)
+    executor = _executor(_worker_count(workers), cluster)
+    job = _pickled(function, setup)
     with closing(RowStore(file, name, json_points)) as store:
         done = {i for i, row in store.rows.items() if row["error"] is None}
-        pending, failed = [i for i in range(len(points)) if i not in done], 0
-        bar = require("tqdm.auto", "sweep").tqdm(
-            total=len(points),
-            initial=len(done),
-            desc=name,
-            unit="point",
-            disable=not as_bool("progress", progress),
-        )
-        with bar, closing(_completed_points(executor, job, points, pending)) as answers:
-            for i, answer in answers:
-                store.add(i, json_points[i] | answer)
-                failed += answer["error"] is not None
-                if failed:
-                    bar.set_postfix(failed=failed, refresh=False)
-                bar.update()
+        pending = [(i, point) for i, point in enumerate(points) if i not in done]
+        with closing(_answers(executor, job, pending)) as answers:
+            bar = require("tqdm.auto", "sweep").tqdm(
+                answers,
+                total=len(points),
+                initial=len(done),
+                desc=name,
+                unit="point",
+                disable=not as_bool("progress", progress),
+            )
+            failed = 0
+            with bar:
+                for i, answer in bar:
+                    failed += answer["error"] is not None
+                    if failed:
+                        bar.set_postfix(failed=failed, refresh=False)
+                    store.add(i, json_points[i] | answer)
         return as_frame(store.rows)
-
-
-class _Job(NamedTuple):
-    """Data of a worker for all points: the sweep's token, and the pickled function and setup."""
-
-    token: str
-    payload: bytes
 
 
 def _grid_points(grid: Any) -> list[Row]:
@@ -161,7 +152,7 @@ def _grid_points(grid: Any) -> list[Row]:
     if isinstance(grid, Mapping):
         axes = {}
         for name, values in grid.items():
-            if isinstance(values, str) or not _is_iterable(values):
+            if not _is_list(values):
                 raise InputError(
                     f"The grid's {name!r} must be a list of values, not {short_repr(values)}. For "
                     f"a single value, use [{short_repr(values)}]."
@@ -172,12 +163,9 @@ def _grid_points(grid: Any) -> list[Row]:
                     f"The grid's {name!r} has no values, so the grid has no points. Give at least "
                     f"one value."
                 )
-        points = (
-            [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
-            if axes
-            else []
-        )
-    elif _is_iterable(grid) and not isinstance(grid, str):
+        rows = itertools.product(*axes.values()) if axes else ()
+        points = [dict(zip(axes, row, strict=True)) for row in rows]
+    elif _is_list(grid):
         points = list(grid)
         for point in points:
             if not isinstance(point, Mapping):
@@ -185,7 +173,6 @@ def _grid_points(grid: Any) -> list[Row]:
                     f"A grid that is a list must hold a dict, name -> value, for each point, not "
                     f"{short_repr(point)}."
                 )
-        points = [dict(point) for point in points]
     else:
         raise InputError(
             f"The grid must be a dict, name -> list of values, or a list of dicts, not "
@@ -199,12 +186,13 @@ def _grid_points(grid: Any) -> list[Row]:
                 f"A parameter cannot be called {short_repr(name)}. Use another string; the names "
                 f"{' and '.join(RESERVED_NAMES)} are reserved."
             )
-    return points
+    return [dict(point) for point in points]
 
 
-def _is_iterable(value: Any) -> bool:
-    """Return whether a value can be iterated, unlike an array of shape ()."""
-    return isinstance(value, Iterable) and getattr(value, "shape", None) != ()
+def _is_list(value: Any) -> bool:
+    """Return whether a value can be iterated, unlike an array of shape (), and is no string."""
+    is_iterable = isinstance(value, Iterable) and getattr(value, "shape", None) != ()
+    return is_iterable and not isinstance(value, str)
 
 
 def _function_name(function: Any, file: Any) -> str:
@@ -242,10 +230,10 @@ def _worker_count(workers: Any) -> int:
     return as_integer("workers", workers, 1, _MAX_WORKERS, "None is one process on each core")
 
 
-def _make_job(function: Any, setup: Any) -> _Job:
-    """Pickle the function and setup."""
+def _pickled(function: Any, setup: Any) -> _Job:
+    """Return the function and setup as a job for workers."""
     try:
-        return _Job(uuid.uuid4().hex, require("cloudpickle", "sweep").dumps((function, setup)))
+        return uuid.uuid4().hex, require("cloudpickle", "sweep").dumps((function, setup))
     except InputError:
         raise
     except Exception as error:
@@ -257,10 +245,7 @@ def _make_job(function: Any, setup: Any) -> _Job:
 
 @contextmanager
 def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
-    """Yield an executor on this computer or the cluster, and how many points to submit at a time.
-
-    On an exception, unfinished points are dropped.
-    """
+    """Yield an executor, here or on the cluster, and how many points to submit at a time."""
     if cluster is None:
         executor = require("loky", "sweep").get_reusable_executor(
             workers,
@@ -271,7 +256,7 @@ def _executor(workers: int, cluster: Any) -> Iterator[tuple[Executor, int]]:
         )
         try:
             yield executor, _POINTS_PER_WORKER * workers
-        except BaseException:
+        except BaseException:  # unfinished points are dropped
             executor.shutdown(kill_workers=True)
             raise
         return
@@ -295,44 +280,32 @@ def _watch_parent(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-@contextmanager
-def _dask_client(cluster: Any) -> Iterator[Any]:
-    """Yield the given Dask client, or a new one for an address."""
-    try:
-        from distributed import Client
-        from distributed.comm import parse_host_port
-    except ImportError:
-        raise InputError(
-            "A cluster needs Dask, which is not installed. Install it with "
-            'pip install "floatbase[cluster]".'
-        ) from None
-    if isinstance(cluster, Client):
+def _dask_client(cluster: Any) -> Any:
+    """Return a context with the given Dask client, or with a new one for an address."""
+    distributed = require("distributed", "cluster")
+    if isinstance(cluster, distributed.Client):
         if cluster.status != "running":
             raise InputError(f"The Dask client is {cluster.status}. Make a new one.")
-        yield cluster
-        return
+        return nullcontext(cluster)
     if not isinstance(cluster, str):
         raise InputError(
             f"cluster must be a dask.distributed.Client or a scheduler's address, not "
             f"{short_repr(cluster)}."
         )
     try:
-        parse_host_port(cluster)
-        client = Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
+        distributed.comm.parse_host_port(cluster)
+        return distributed.Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
             f"No Dask scheduler answers at {cluster} ({error}). Give the address that "
             "`dask scheduler` prints, such as tcp://127.0.0.1:8786."
         ) from None
-    with client:
-        yield client
 
 
-def _completed_points(
+def _answers(
     executor: AbstractContextManager[tuple[Executor, int]],
     job: _Job,
-    points: list[Row],
-    pending: list[int],
+    pending: list[tuple[int, Row]],
 ) -> Generator[tuple[int, Row], None, None]:
     """Yield the number and row of each pending point as it finishes."""
     if not pending:
@@ -340,8 +313,8 @@ def _completed_points(
     remaining, submitted = iter(pending), dict[Future[Row | Exception], int]()
     with executor as (pool, max_submitted):
         while True:
-            for i in itertools.islice(remaining, max_submitted - len(submitted)):
-                submitted[pool.submit(_run_point, job, points[i])] = i
+            for i, point in itertools.islice(remaining, max_submitted - len(submitted)):
+                submitted[pool.submit(_run_point, job, point)] = i
             if not submitted:
                 return
             for future in wait(submitted, return_when=FIRST_COMPLETED).done:
@@ -366,24 +339,37 @@ _this_thread = threading.local()  # of a worker: function and token of its prese
 
 
 def _run_point(job: _Job, point: Row) -> Row | Exception:
-    """Return the results of a point, or the exception that ends the sweep.
-
-    This function runs in a worker. It does not raise, because Dask would log the exception for each
-    point.
-    """
+    """Return the results of a point as JSON values, or the exception that ends the sweep."""
+    # this runs in a worker, and returns the exception because Dask would log it for each point
     try:
-        return _evaluate(job, point)
+        function = _loaded(*job)
+        try:
+            answer = function(**point)
+        except (Exception, SystemExit) as error:  # sys.exit would end the worker
+            return {"error": f"{type(error).__name__}: {error}"}
+        results = answer if isinstance(answer, Mapping) else {"result": answer}
+        for name in results:
+            if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
+                raise InputError(
+                    f"The function's result {name!r} needs another name: a string that is neither "
+                    f"reserved nor a parameter."
+                )
+        return {
+            name: as_json_value(f"the function's result {name!r}", value)
+            for name, value in results.items()
+        } | {"error": None}
+    except InputError as error:
+        return error
     except Exception as error:
-        if not isinstance(error, InputError):
-            error.add_note(f"in a worker:\n{traceback.format_exc()}")
+        error.add_note(f"in a worker:\n{traceback.format_exc()}")
         return error
 
 
-def _evaluate(job: _Job, point: Row) -> Row:
-    """Return the function's results at a point, as JSON values, and "error"."""
-    if getattr(_this_thread, "token", None) != job.token:
+def _loaded(token: str, payload: bytes) -> Any:
+    """Return a job's function with the result of `setup`, made once in each thread."""
+    if getattr(_this_thread, "token", None) != token:
         try:
-            function, setup = pickle.loads(job.payload)
+            function, setup = pickle.loads(payload)
         except (ImportError, AttributeError) as error:
             raise InputError(
                 f"A worker cannot load the function: {error}. The workers must be able to import "
@@ -391,22 +377,5 @@ def _evaluate(job: _Job, point: Row) -> Row:
                 "except those that lru_cache wraps; use setup instead."
             ) from error
         _this_thread.function = function if setup is None else partial(function, setup())
-        _this_thread.token = job.token
-    try:
-        answer = _this_thread.function(**point)
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # sys.exit would silently end the program that runs the sweep
-        return {"error": f"{type(error).__name__}: {error}"}
-    results = answer if isinstance(answer, Mapping) else {"result": answer}
-    for name in results:
-        if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
-            raise InputError(
-                f"The function's result {name!r} needs another name: a string that is neither "
-                f"reserved nor a parameter."
-            )
-    return {
-        name: as_json_value(f"the function's result {name!r}", value)
-        for name, value in results.items()
-    } | {"error": None}
+        _this_thread.token = token
+    return _this_thread.function

@@ -105,12 +105,8 @@ def target_and_eye(view: View, low: Array, high: Array) -> tuple[Array, Array]:
         target, radius = np.array(view.around[0]), view.around[1]
     distance = view.distance * radius / np.sin(np.radians(view.angle) / 2)
     azimuth, elevation = np.radians([view.azimuth, view.elevation])
-    direction = [
-        np.cos(elevation) * np.cos(azimuth),
-        np.cos(elevation) * np.sin(azimuth),
-        np.sin(elevation),
-    ]
-    return target, target + distance * np.array(direction)
+    x, y = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+    return target, target + distance * np.array([x, y, np.sin(elevation)])
 
 
 class FollowingCamera:
@@ -139,28 +135,19 @@ class FollowingCamera:
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self.follows and self.robot.is_floating
         start = (self._state or painter.standing).joint_transforms[1][:3, 3]
-        return protocol.set_follow(
-            ROOT + base if follows else "",
-            start,
-            self._displacement(painter),
-            smooth=followed == ROBOT,
-        )
+        node, moved = ROOT + base if follows else "", self._displacement(painter)
+        return protocol.set_follow(node, start, moved, smooth=followed == ROBOT)
 
     def _placement(self, painter: Painter, view: View) -> tuple[Array, Array, float]:
         """Return the camera's position and target, shape (3,) [m], and its angle [degrees]."""
         low, high = painter.feet_box if view.feet else painter.box
-        moved = self._displacement(painter) + [
-            0.0,
-            0.0,
-            painter.drawn_ground.height(painter.standing.com),
-        ]
+        height = painter.drawn_ground.height(painter.standing.com)
+        moved = self._displacement(painter) + [0.0, 0.0, height]
         target, eye = target_and_eye(view, low + moved, high + moved)
         return eye, target, view.angle
 
     def _displacement(self, painter: Painter) -> Array:
         """Return how far the robot was from its standing pose, along the ground [m]."""
         return displacement(
-            painter.drawn_ground,
-            painter.standing.com,
-            (self._state or painter.standing).com,
+            painter.drawn_ground, painter.standing.com, (self._state or painter.standing).com
         )

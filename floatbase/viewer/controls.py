@@ -89,28 +89,14 @@ class Controls:
     ) -> None:
         """Add a toggle for a term of an equation, above the picture."""
         changed = as_callable("changed", changed, "changed(value)")
-        self._add_control(
-            name,
-            changed,
-            value=as_bool("value", value),
-            term=as_string("symbol", symbol),
-            part=as_string("part", part),
-        )
+        value, symbol = as_bool("value", value), as_string("symbol", symbol)
+        self._add_control(name, changed, value=value, term=symbol, part=as_string("part", part))
 
     def add_text(self, name: str, words: str, section: str = "", code: bool = False) -> None:
         """Write text into the panel, or change it."""
         place = _placement(name, section)
-        self.window.put(
-            [
-                protocol.page_command(
-                    "set_text",
-                    name=name,
-                    text=as_string("words", words),
-                    code=as_bool("code", code),
-                    **place,
-                )
-            ]
-        )
+        text = {"text": as_string("words", words), "code": as_bool("code", code)}
+        self.window.put([protocol.page_command("set_text", name=name, **text, **place)])
 
     def add_plot_point(self, name: str, t: float, value: float, unit: str = "") -> None:
         """Add a point to the plot of a quantity over the last seconds, at the top of the panel."""
@@ -119,9 +105,8 @@ class Controls:
             "value": as_number("value", value),
             "unit": as_string("unit", unit),
         }
-        self.window.put(
-            [protocol.page_command("add_plot_point", name=as_string("name", name), **point)]
-        )
+        name = as_string("name", name)
+        self.window.put([protocol.page_command("add_plot_point", name=name, **point)])
 
     def on_drag(self, pushed: Callable[[float, float], None], max_force: float) -> None:
         """Set the function that is called when the user drags the robot with Shift held down."""

@@ -67,11 +67,8 @@ class Output:
             import ipywidgets
 
             return ipywidgets.HTML(self._static_frame(), layout=ipywidgets.Layout(width="auto"))
-        return self.window.widget(
-            self.robot.name,
-            self.height,
-            thumbnail.render_png(self.renderer.picture, self.window.scene, self.height),
-        )
+        image = thumbnail.render_png(self.renderer.picture, self.window.scene, self.height)
+        return self.window.widget(self.robot.name, self.height, image)
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         """Return the live picture, and an image of it for readers that cannot show widgets."""
@@ -90,10 +87,8 @@ class Output:
 
     def _static_frame(self) -> str:
         """Return the current scene as an HTML frame that needs no kernel."""
-        name, style = (
-            html.escape(self.robot.name),
-            f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px",
-        )
+        name = html.escape(self.robot.name)
+        style = f"width: 100%; height: {self.height}px; border: 0; border-radius: 6px"
         return (
             f'<iframe srcdoc="{html.escape(self.static_html())}" title="{name}" '
             f'style="{style}"></iframe>'

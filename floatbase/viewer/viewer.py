@@ -116,25 +116,17 @@ class Viewer(Controls, Output):
         requested = None if scale is None else as_positive("scale", scale, "m/N")
         background_colour, _, line_colour, text_colour = BACKGROUNDS[background]
         self.painter = Painter(
-            robot,
-            requested,
-            facets,
-            polyhedron.inner_approximation,
-            polyhedron.facet_rotation,
-            _ground(ground),
-            line_colour,
-            text_colour,
-            background_colour,
-        )
+            robot, requested, facets, polyhedron.inner_approximation, polyhedron.facet_rotation,
+            _ground(ground), line_colour, text_colour, background_colour,
+        )  # fmt: skip
         self.window = Window(port)
         self.renderer = DiffRenderer(self.window)
         self._camera = FollowingCamera(robot, as_bool("follow", follow))
         self._view = View()  # of the camera, when a first picture or a recording places it
         self._is_playing = False
         self._last: State | None = None
-        self._legend_entries: dict[
-            str, tuple[RGB, str]
-        ] = {}  # colour and meaning of each user-defined kind of item
+        # colour and meaning of each user-defined kind of item
+        self._legend_entries: dict[str, tuple[RGB, str]] = {}
         super().__init__()
         self._set_stage(background)
 
@@ -236,10 +228,8 @@ class Viewer(Controls, Output):
             Text of the entry.
         """
         red, green, blue = np.clip(as_array("colour", colour, (3,)), 0.0, 1.0).tolist()
-        self._legend_entries[as_string("kind", kind)] = (
-            (red, green, blue),
-            as_string("meaning", meaning),
-        )
+        entry = (red, green, blue), as_string("meaning", meaning)
+        self._legend_entries[as_string("kind", kind)] = entry
 
     def multiplier_labels(self, state: State, contacts: Contacts, solution: Solution) -> Picture:
         """Make labels for the multipliers of active friction constraints, for `extra` of `show`.
@@ -272,17 +262,10 @@ class Viewer(Controls, Output):
             If the solution belongs to other contacts, or the state to another robot.
         """
         self.painter.check_robot("state", as_instance("state", state, State).robot)
-        positions, height = (
-            as_instance("contacts", contacts, Contacts).positions(state),
-            self.painter.cone_height(contacts),
-        )
-        drawn = markers.multiplier_labels(
-            positions,
-            contacts,
-            as_instance("solution", solution, Solution),
-            height,
-            self.painter.size,
-        )
+        positions = as_instance("contacts", contacts, Contacts).positions(state)
+        height, size = self.painter.cone_height(contacts), self.painter.size
+        as_instance("solution", solution, Solution)
+        drawn = markers.multiplier_labels(positions, contacts, solution, height, size)
         return prefixed("multiplier", drawn)
 
     def walk_overlay(self, walk: Walk, state: State) -> Picture:
@@ -342,9 +325,8 @@ class Viewer(Controls, Output):
     @property
     def _overlay_style(self) -> gait_overlay.Style:
         """Size, ground and text colour of the overlays."""
-        return gait_overlay.Style(
-            self.painter.size, self.painter.drawn_ground, self.painter.text_colour
-        )
+        painter = self.painter
+        return gait_overlay.Style(painter.size, painter.drawn_ground, painter.text_colour)
 
     def draw(
         self, picture: Picture, title: str | None = None, ghost_name: str = GHOST_NAME
@@ -438,10 +420,8 @@ class Viewer(Controls, Output):
         _check_texts(title=title, ghost_name=ghost_name)
         if self.painter.ground is None and rollout.ground is not None and rollout.ground.boxes:
             self.set_ground(rollout.ground)
-        rows, planned_steps = (
-            recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s")),
-            gait_overlay.as_steps(steps),
-        )
+        rows = recording.sampled_rows(rollout.time, as_positive("rate", rate, "1/s"))
+        planned_steps = gait_overlay.as_steps(steps)
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
         contacts, columns = recording.point_force_contacts(rollout.contacts)
@@ -450,24 +430,16 @@ class Viewer(Controls, Output):
             overlay: Picture = dict(options.get("extra") or {})
             if (step := gait_overlay.step_at(planned_steps, t)) is not None:
                 overlay |= self.step_overlay(step, t, state)
-            plan = rollout.planned[i, columns]
+            measured, plan = rollout.measured[i, columns], rollout.planned[i, columns]
+            shown_plan = plan if planned and np.isfinite(plan).all() else None
             chosen: PictureKeywords = {**options, "extra": overlay}
             chosen["push"] = recording.push_at(rollout, i)
             chosen["swing_feet"] = recording.swing_feet_at(rollout, i)
             chosen = cast(PictureKeywords, recording.joint_limits_at(rollout, i) | dict(chosen))
-            pictures.append(
-                self.painter.picture(
-                    state,
-                    contacts,
-                    rollout.measured[i, columns],
-                    plan if planned and np.isfinite(plan).all() else None,
-                    **chosen,
-                )
-            )
+            pictures.append(self.painter.picture(state, contacts, measured, shown_plan, **chosen))
         if follow and self.robot.is_floating:
-            places = recording.smoothed(
-                times, np.array([state.joint_transforms[1][:3, 3] for state in states])
-            )
+            bases = np.array([state.joint_transforms[1][:3, 3] for state in states])
+            places = recording.smoothed(times, bases)
             pictures = [
                 picture | {FOLLOWED: shapes.invisible_point(at)}
                 for picture, at in zip(pictures, places, strict=True)
@@ -509,9 +481,8 @@ class Viewer(Controls, Output):
         _check_texts(title=title, ghost_name=ghost_name)
         moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
         self.draw(moving.first, title)
-        self.renderer.set(
-            *self._caption(set[str]().union(*map(legend.kinds, pictures)), title, ghost_name)
-        )
+        kinds = set[str]().union(*map(legend.kinds, pictures))
+        self.renderer.set(*self._caption(kinds, title, ghost_name))
         self.window.put([moving.command])
         self._is_playing = True
         return self
@@ -562,9 +533,8 @@ class Viewer(Controls, Output):
         words : str
             The message.
         """
-        self.renderer.set(
-            protocol.page_command("set_disconnect_message", text=as_string("words", words))
-        )
+        text = as_string("words", words)
+        self.renderer.set(protocol.page_command("set_disconnect_message", text=text))
 
     def close(self) -> None:
         """Close the page: end its thread and free its port."""
@@ -589,12 +559,10 @@ class Viewer(Controls, Output):
         self, shown: set[str], title: str | None, ghost_name: str
     ) -> tuple[protocol.Update, protocol.Update]:
         """Return the commands for the title and for the legend of the kinds that are shown."""
-        return protocol.page_command("set_title", text=title or ""), legend.command(
-            frozenset(shown),
-            ghost_name,
-            self.painter.text_colour,
-            tuple((kind, *entry) for kind, entry in self._legend_entries.items()),
-        )
+        entries = tuple((kind, *entry) for kind, entry in self._legend_entries.items())
+        colour = self.painter.text_colour
+        caption = legend.command(frozenset(shown), ghost_name, colour, entries)
+        return protocol.page_command("set_title", text=title or ""), caption
 
 
 def _check_texts(**texts: str | None) -> None:
@@ -607,9 +575,8 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> DrawnGround | None:
     """Return the ground as it is drawn, or None for None."""
     if ground is None:
         return None
-    from floatbase.simulation import (
-        Ground,
-    )  # loads MuJoCo, which no picture of a level ground needs
+    # loads MuJoCo, which no picture of a level ground needs
+    from floatbase.simulation import Ground
 
     made = ground if isinstance(ground, Ground) else Ground(normal=unit_vector("ground", ground))
     planes = []

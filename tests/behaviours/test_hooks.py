@@ -30,7 +30,8 @@ def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollou
     return fb.rollout(fb.Simulation(walk.robot, **options), walk, duration, pushes, PERIOD)
 
 
-def test_a_hand_draws_a_circle_in_the_world_while_its_robot_trots_and_is_pushed() -> None:
+@pytest.mark.front_end
+def test_a_hand_draws_a_circle_in_the_world_while_its_robot_trots_and_is_pushed():
     robot = judges.load("anymal_kinova")
     hand = robot.standing().point(HAND)
 
@@ -55,7 +56,7 @@ HAND = "j2s6s200_end_effector"
 
 
 @pytest.mark.parametrize("height", [None, 0.05])
-def test_a_foothold_may_have_a_height(height: float | None) -> None:
+def test_a_foothold_may_have_a_height(height):
     def rule(foot: str, touchdown: float, walk: Walk) -> npt.ArrayLike:
         xy = raibert_foothold(foot, touchdown, walk)
         return xy if height is None else [*xy, height]
@@ -67,13 +68,13 @@ def test_a_foothold_may_have_a_height(height: float | None) -> None:
         assert np.isclose(place[2], level if height is None else height, atol=1e-3), foot
 
 
-def test_a_foothold_of_a_wrong_shape_is_refused() -> None:
+def test_a_foothold_of_a_wrong_shape_is_refused():
     record = run(trot(foothold=lambda foot, touchdown, walk: np.zeros(4)), 0.3)
     assert record.outcome == "controller failed" and isinstance(record.error, InputError)
     assert "(4,)" in str(record.error)
 
 
-def test_a_user_defined_adjustment_decides_where_feet_land() -> None:
+def test_a_user_defined_adjustment_decides_where_feet_land():
     asked = set()
 
     def none(
@@ -101,7 +102,7 @@ def test_a_user_defined_adjustment_decides_where_feet_land() -> None:
     assert max(moved[:2]) < 0.01 < min(moved[2:])  # m
 
 
-def test_a_plan_may_be_replaced_and_made_more_often() -> None:
+def test_a_plan_may_be_replaced_and_made_more_often():
     class Wrapped:
         """A plan of the centre of mass that the compiled function does not know."""
 
@@ -126,7 +127,7 @@ def test_a_plan_may_be_replaced_and_made_more_often() -> None:
     assert failed.outcome == "controller failed" and isinstance(failed.error, InputError)
 
 
-def test_swings_may_have_another_shape_or_class() -> None:
+def test_swings_may_have_another_shape_or_class():
     class Wrapped:
         """A `Swing` that the compiled function does not know."""
 
@@ -155,7 +156,7 @@ def test_swings_may_have_another_shape_or_class() -> None:
     assert np.abs(records[0].q - records[1].q).max() < 1e-9
 
 
-def test_the_body_may_be_lower_and_pitched_while_it_walks() -> None:
+def test_the_body_may_be_lower_and_pitched_while_it_walks():
     walk = trot(height=-0.03)
     sim = fb.Simulation(walk.robot)
     assert fb.rollout(sim, walk, 1.0, control_period=PERIOD).outcome == "completed"
@@ -168,7 +169,7 @@ def test_the_body_may_be_lower_and_pitched_while_it_walks() -> None:
     assert np.isclose(np.arcsin(-x_axis[2]), 0.1, atol=0.02)
 
 
-def test_the_commanded_motion_approaches_its_goal_at_the_largest_acceleration() -> None:
+def test_the_commanded_motion_approaches_its_goal_at_the_largest_acceleration():
     walk = trot(velocity=(0.4, 0.0), yaw_rate=0.3, acceleration=(0.5, 2.0))
     standing = walk.robot.standing()
     for t in np.arange(0.0, 0.61, 0.1):
@@ -190,7 +191,7 @@ class KnownPlane:
         return self._normal
 
 
-def test_soles_follow_a_ground_that_is_known() -> None:
+def test_soles_follow_a_ground_that_is_known():
     """With level soles, talos slid 20 mm in each stance on a slope of 5°."""
     robot, angle = judges.load("talos"), np.deg2rad(5.0)
     normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
@@ -203,7 +204,7 @@ def test_soles_follow_a_ground_that_is_known() -> None:
     assert slides[False] < 2e-3 < 5e-3 < slides[True]  # m
 
 
-def test_a_pendulum_of_another_frequency_is_followed_as_planned() -> None:
+def test_a_pendulum_of_another_frequency_is_followed_as_planned():
     def slower(plan: StepPlan, state: fb.State) -> StepPlan:
         return replace(plan, plan=replace(plan.plan, omega=0.8 * plan.plan.omega))
 
@@ -214,7 +215,7 @@ def test_a_pendulum_of_another_frequency_is_followed_as_planned() -> None:
     assert np.allclose(targets.reshape(3, 3)[:, :2], plan(0.1), rtol=0.0, atol=1e-12)
 
 
-def test_an_adjustment_may_keep_its_arguments() -> None:
+def test_an_adjustment_may_keep_its_arguments():
     kept = []
 
     def keep(
@@ -230,7 +231,7 @@ def test_an_adjustment_may_keep_its_arguments() -> None:
     assert np.allclose(kept[0][0], state.com) and np.allclose(kept[0][1], 0.0)
 
 
-def test_a_class_derived_from_swing_keeps_its_shape_with_another_end() -> None:
+def test_a_class_derived_from_swing_keeps_its_shape_with_another_end():
     class Higher(Swing):
         def __call__(self, t: float) -> Any:
             position, velocity, acceleration = super().__call__(t)
@@ -240,7 +241,7 @@ def test_a_class_derived_from_swing_keeps_its_shape_with_another_end() -> None:
     assert path(0.3)[0].tolist() == [0.2, 0.0, 1.0]
 
 
-def test_joints_brake_as_the_torque_limits_of_a_walk_allow() -> None:
+def test_joints_brake_as_the_torque_limits_of_a_walk_allow():
     robot = judges.load("go2")
     torque_limits = 0.2 * robot.torque_limits
     walk = trot(torque_limits=torque_limits)

@@ -57,9 +57,7 @@ def random_steps(
 @pytest.mark.filterwarnings("ignore::floatbase.errors.SimulationWarning")
 @pytest.mark.parametrize("known_ground", [False, True])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_one_compiled_function_writes_what_the_definitions_say(
-    name: str, known_ground: bool
-) -> None:
+def test_one_compiled_function_writes_what_the_definitions_say(name, known_ground):
     rng = np.random.default_rng(2)
     ground = Slope(rng.normal(0.0, 0.15, 2), 0.01) if known_ground else None
     fast, slow = walks(name, ("compiled", "reference"), ground=ground, pitch=0.05)
@@ -87,7 +85,7 @@ def angular_velocity(before: np.ndarray, R: np.ndarray, after: np.ndarray, dt: f
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name: str) -> None:
+def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name):
     """By central differences, on a slope, while the robot turns."""
     (walk,) = walks(name, ("compiled",), ground=Slope(np.array([0.1, -0.05]), 0.0))
     state, step, t = judges.load(name).standing(), 1e-5, 0.0
@@ -108,7 +106,7 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name: s
             assert np.allclose(omega, values[9:12], atol=1e-3)
 
 
-def test_a_rollout_records_the_targets_of_each_step() -> None:
+def test_a_rollout_records_the_targets_of_each_step():
     (walk,) = walks("go2", ("compiled",))
     robot, commands = judges.load("go2"), []
 
@@ -131,7 +129,7 @@ def test_a_rollout_records_the_targets_of_each_step() -> None:
     assert {"position of FL_foot", "posture"} <= set(run.targets)
 
 
-def test_a_sole_turns_the_short_way_where_yaw_angles_jump_by_a_whole_turn() -> None:
+def test_a_sole_turns_the_short_way_where_yaw_angles_jump_by_a_whole_turn():
     """The measured yaw jumps from π to -π, and the yaw of the path does not."""
     robot = judges.load("talos")
     gait = Gait.walk(robot, start=0.0)

@@ -21,6 +21,7 @@ import judges
 import numpy as np
 import pytest
 from messages import refused, warns
+from numpy.testing import assert_allclose
 
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
@@ -63,7 +64,7 @@ def speed(record: Rollout, begin: float, end: float) -> np.ndarray:
     return (record.com[last, :2] - record.com[first, :2]) / (record.time[last] - record.time[first])
 
 
-def test_a_trot_goes_at_the_desired_speed_straight_and_upright() -> None:
+def test_a_trot_goes_at_the_desired_speed_straight_and_upright():
     record, _ = trot()
     assert record.outcome == "completed"
     assert np.allclose(speed(record, 2.5, 4.5), [0.3, 0.0], atol=0.01)  # two whole periods
@@ -72,7 +73,7 @@ def test_a_trot_goes_at_the_desired_speed_straight_and_upright() -> None:
     assert record.slip(include_rolling=False).max() < 3e-3
 
 
-def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
+def test_the_momentum_of_a_walk_changes_by_what_the_ground_does():
     record, walk = trot()
     rows = (record.time > 2.0) & (record.time < 4.0)
     time, forces = record.time[rows], record.measured[rows].reshape(rows.sum(), -1, 3).sum(axis=1)
@@ -81,14 +82,11 @@ def test_the_momentum_of_a_walk_changes_by_what_the_ground_does() -> None:
         record.state(int(np.searchsorted(record.time, t))).com_velocity for t in (time[0], time[-1])
     ]
     impulse = (forces[:-1] + gravity).sum(axis=0) * PERIOD
-    assert np.allclose(
-        impulse,
-        walk.robot.mass * (ends[1] - ends[0]),
-        atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5,
-    )
+    expected = walk.robot.mass * (ends[1] - ends[0])
+    assert np.allclose(impulse, expected, atol=0.02 * walk.robot.weight * PERIOD * len(time) ** 0.5)
 
 
-def test_every_tick_of_a_walk_is_compiled() -> None:
+def test_every_tick_of_a_walk_is_compiled():
     walk, backends = walk_of("go2", Gait.trot, (0.3, 0.0)), []
 
     class Told:
@@ -107,13 +105,14 @@ def test_every_tick_of_a_walk_is_compiled() -> None:
     assert set(backends) == {"compiled"}
 
 
-def test_a_trot_bears_pushes_from_the_side() -> None:
+def test_a_trot_withstands_pushes_from_the_side():
     record, _ = trot(60.0)
     assert record.outcome == "completed" and abs(record.com[-1, 1]) < 0.15 and tilt(record) < 2.0
     assert trot(200.0)[0].outcome == "completed"
 
 
-def test_each_foot_is_lifted_in_turn_while_the_robot_stands() -> None:
+@pytest.mark.front_end
+def test_each_foot_is_lifted_in_turn_while_the_robot_stands():
     walk = walk_of("go2", lambda robot: Gait.crawl(robot, swing=0.5, pause=0.5))
     record = run(walk, 5.5)
     radius = walk.robot.feet[0].radius
@@ -123,7 +122,8 @@ def test_each_foot_is_lifted_in_turn_while_the_robot_stands() -> None:
     assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
 
 
-def test_a_ramp_takes_the_jumps_out_of_the_torques() -> None:
+@pytest.mark.front_end
+def test_a_ramp_takes_the_jumps_out_of_the_torques():
     jumps = {}
     for ramp in (0.0, 0.1):
         walk = walk_of(
@@ -142,25 +142,25 @@ def test_a_ramp_takes_the_jumps_out_of_the_torques() -> None:
     assert jumps[0.1] < 1.5 and jumps[0.1] < 0.5 * jumps[0.0]  # N·m
 
 
-def test_talos_walks_on_flat_feet() -> None:
+def test_talos_walks_on_flat_feet():
     record = run(walk_of("talos", Gait.walk, (0.2, 0.0)), 4.5)
     assert record.outcome == "completed" and tilt(record) < 0.5
     assert np.isclose(speed(record, 3.0, 4.4)[0], 0.2, rtol=0.06)  # one period
     assert record.measured[:, 2::3].max() < 0.9 * judges.load("talos").weight
 
 
-def test_it_turns_on_the_spot_and_goes_sideways() -> None:
+def test_it_turns_on_the_spot_and_goes_sideways():
     walk = walk_of("go2", Gait.trot, (0.0, 0.1), yaw_rate=0.5)
     record = run(walk, 4.0)
     assert record.outcome == "completed"
     q = record.q[-1]
     yaw = np.arctan2(2.0 * (q[6] * q[5] + q[3] * q[4]), 1.0 - 2.0 * (q[4] ** 2 + q[5] ** 2))
-    assert np.isclose(
-        yaw, 0.5 * (3.0 - 0.25), atol=0.1
-    )  # half a second of it speeds up by 1 rad/s²
+    # half a second of it speeds up by 1 rad/s²
+    assert np.isclose(yaw, 0.5 * (3.0 - 0.25), atol=0.1)
 
 
-def test_it_keeps_its_speed_on_a_circle() -> None:
+@pytest.mark.front_end
+def test_it_keeps_its_speed_on_a_circle():
     """The centre of mass runs on a smaller circle than the feet: it was 5 % slower at 1.5 rad/s."""
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.2, 0.0), yaw_rate=1.5)
     record = run(walk, 3.6)
@@ -172,7 +172,7 @@ def test_it_keeps_its_speed_on_a_circle() -> None:
     assert np.isclose(radius, 0.2 / 1.5, rtol=0.03)
 
 
-def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew() -> None:
+def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew():
     walk = walk_of("go2", Gait.trot)
     sim = fb.Simulation(walk.robot)
     assert fb.rollout(sim, walk, 1.5, control_period=PERIOD).outcome == "completed"
@@ -186,50 +186,42 @@ def test_velocity_and_gait_may_change_while_it_walks_and_a_reset_begins_anew() -
     assert len(walk.history) == 1 and len(walk.stance) == 4
 
 
-def test_steps_save_a_robot_that_would_fall() -> None:
+def test_steps_save_a_robot_that_would_fall():
     robot = judges.load("go2")
     contacts, push = fb.Contacts.feet(robot, mu=0.6), fb.Push([0.0, 250.0, 0.0], start=0.3)
     standing, stepping = Stand(robot, contacts), Stand(robot, contacts, Gait.trot(robot, swing=0.2))
     assert run(standing, 2.5, push).outcome != "completed"
     record = run(stepping, 4.0, push)
-    assert (
-        record.outcome == "completed"
-        and np.linalg.norm(record.final.com_velocity) < 0.1
-        and not stepping.stepping
-    )
+    assert record.outcome == "completed"
+    assert np.linalg.norm(record.final.com_velocity) < 0.1
+    assert not stepping.stepping
     assert any(len(step.stance) < 4 for step in stepping.history)
 
 
 @pytest.mark.parametrize("towards", [(1.0, 1.0), (-1.0, -1.0)])
-def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards: tuple[float, float]) -> None:
+def test_the_feet_towards_which_it_is_pushed_stay_at_first(towards):
     robot = judges.load("go2")
-    stand = Stand(
-        robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot)
-    )  # whose first pair stands along this diagonal
+    # whose first pair stands along this diagonal
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.trot(robot))
     push = fb.Push(np.array([*towards, 0.0]) * 300.0 / np.sqrt(2.0), start=0.2)
-    assert (
-        run(stand, 2.0, push).outcome == "completed"
-    )  # it used to fall at 230 N, which it survives without a step
-    assert next(step.stance for step in stand.history if len(step.stance) == 2) == (
-        "FL_foot",
-        "RR_foot",
-    )
+    # it used to fall at 230 N, which it survives without a step
+    assert run(stand, 2.0, push).outcome == "completed"
+    expected = ("FL_foot", "RR_foot")
+    assert next(step.stance for step in stand.history if len(step.stance) == 2) == expected
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side: str) -> None:
+def test_a_biped_that_is_pushed_aside_lifts_the_other_foot_first(side):
     robot = judges.load("talos")
-    stand = Stand(
-        robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot)
-    )  # whose first foot is the left one
+    # whose first foot is the left one
+    stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), Gait.walk(robot))
     push = fb.Push([0.0, 400.0 if side == "left" else -400.0, 0.0], start=0.1)
     assert run(stand, 1.3, push).outcome == "completed"
-    assert next(step.stance for step in stand.history if len(step.stance) == 1) == (
-        f"{side}_sole_link",
-    )
+    expected = (f"{side}_sole_link",)
+    assert next(step.stance for step in stand.history if len(step.stance) == 1) == expected
 
 
-def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_then() -> None:
+def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_then():
     robot = judges.load("go2")
     gait = Gait({"FL_foot": 0.8, "RR_foot": 0.8, "FR_foot": 0.1 + 0.2, "RL_foot": 0.3}, 0.5, 0.2)
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.7), gait)
@@ -240,14 +232,14 @@ def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_
         assert next(len(step.stance) for step in stand.history if len(step.stance) < 4) == 2
 
 
-def test_it_stands_without_a_step_as_long_as_the_capture_point_is_inside() -> None:
+def test_it_stands_without_a_step_while_the_capture_point_is_inside():
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
     assert run(stand, 1.0, fb.Push([0.0, 40.0, 0.0], start=0.2)).outcome == "completed"
     assert all(len(step.stance) == 4 for step in stand.history)
 
 
-def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
+def test_soft_contacts_yield_if_the_torques_are_too_small():
     robot = judges.load("talos")
     state, contacts = robot.standing(), judges.stance(robot)
     weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
@@ -266,7 +258,7 @@ def test_contacts_give_way_where_torques_do_not_hold_them() -> None:
     assert np.abs(rest).max() < 1e-6 * robot.weight
 
 
-def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
+def test_soft_contacts_give_the_torques_of_hard_ones_if_these_suffice():
     robot = judges.load("go2")
     state, contacts = robot.standing(), judges.stance(robot)
     held, soft = (
@@ -275,12 +267,11 @@ def test_contacts_that_need_not_give_way_stand_as_held_ones_do() -> None:
     )
     assert np.allclose(held(state.q, state.v).tau, soft(state.q, state.v).tau, atol=1e-3)
     other = soft.replace(contacts=contacts.without("FL_foot"))
-    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot") and len(other.tasks) == len(
-        soft.tasks
-    )
+    assert other.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
+    assert len(other.tasks) == len(soft.tasks)
 
 
-def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
+def test_a_walk_softens_its_contacts_if_no_forces_hold_its_feet():
     robot = judges.load("talos")
     weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
     moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
@@ -289,12 +280,11 @@ def test_a_walk_gives_way_where_no_forces_hold_its_feet() -> None:
         fb.WholeBodyController(robot, judges.stance(robot), (), **weak)(moving.q, moving.v)
     command = walk(moving.q, moving.v)
     assert command.softened
-    assert np.all(
-        np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6
-    ) and command.forces.shape == (walk.contacts.k,)
+    assert np.all(np.abs(command.tau) <= 0.2 * robot.torque_limits + 1e-6)
+    assert command.forces.shape == (walk.contacts.k,)
 
 
-def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
+def test_a_walk_and_its_recovery_do_not_depend_on_the_heading():
     robot, ways = judges.load("go2"), []
     feet = [foot.frame for foot in robot.feet]
     for yaw in (0.0, 2.0):
@@ -307,9 +297,8 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
         )
         sim = fb.Simulation(robot)
         sim.reset(robot.standing().replace(q=q))
-        walk = walk_of(
-            "go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw
-        )  # of the facets of friction
+        # of the facets of friction
+        walk = walk_of("go2", Gait.trot, (0.2, 0.0), facet_rotation=yaw)
         record = fb.rollout(sim, walk, 3.0, [fb.Push(turn @ [0.0, 200.0, 0.0], start=1.6)], PERIOD)
         assert record.outcome == "completed"
         ways.append((record.com - record.com[0]) @ turn)
@@ -325,7 +314,7 @@ def test_a_robot_that_looks_elsewhere_walks_and_catches_itself_alike() -> None:
 # one test for each fall during development -------------------------------------------------------
 
 
-def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
+def test_a_step_is_limited_about_the_body_and_not_about_the_plan():
     record, walk = trot(200.0)
     reach = max(
         np.linalg.norm((step.feet[foot] - record.com[i])[:2])
@@ -336,39 +325,37 @@ def test_a_step_is_limited_about_the_body_and_not_about_the_plan() -> None:
     )
     leg = max(np.linalg.norm(foot - record.com[0, :2]) for foot in record.foot_positions[0, :, :2])
     assert record.outcome == "completed"  # it falls if footholds are limited around the plan
-    assert (
-        reach < leg + walk.options.reach + 0.05
-    )  # relative to the body, which the push has moved away from the plan
+    # relative to the body, which the push has moved away from the plan
+    assert reach < leg + walk.options.reach + 0.05
 
 
-def test_a_stance_with_area_does_not_throw_its_feet_away() -> None:
+def test_a_stance_with_area_does_not_throw_its_feet_away():
     record = run(walk_of("go2", lambda robot: Gait.crawl(robot, swing=1.2, pause=0.3)), 4.2)
     assert record.outcome == "completed"  # a millimetre grows by e^{ω 1.2 s} = 830
     assert np.linalg.norm(record.foot_positions[-1] - record.foot_positions[0], axis=1).max() < 0.01
 
 
-def test_posture_gives_way_to_the_walk() -> None:
+def test_a_stiff_posture_task_disturbs_the_walk():
     stiff = Gains(posture=(100.0, 1.0))
     fast = speed(run(walk_of("go2", Gait.trot, (0.3, 0.0), gains=stiff), 3.6), 2.5, 3.5)[0]
     assert abs(fast - 0.3) > 5 * abs(speed(trot()[0], 2.5, 3.5)[0] - 0.3)
 
 
-def test_feet_aim_at_the_ground_and_not_below_it() -> None:
+def test_feet_aim_at_the_ground_and_not_below_it():
     record, walk = trot()
     heights = np.array([foot[2] for step in walk.history for foot in step.footholds.values()])
     standing = record.state(0).point("FL_foot")[2]
     assert np.ptp(heights) < 1e-3 and np.all(np.abs(heights - standing) < 1e-3)
 
 
-def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot() -> None:
+def test_a_jump_of_the_velocity_is_a_ramp_for_the_robot():
     record = run(walk_of("go2", Gait.trot, (0.9, 0.0)), 3.5)
     assert record.outcome == "completed"
-    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8 and np.isclose(
-        speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1
-    )
+    assert 0.3 < speed(record, 1.4, 1.9)[0] < 0.8
+    assert np.isclose(speed(record, 2.5, 3.4)[0], 0.9, rtol=0.1)
 
 
-def test_gaits_that_sway_are_refused_unless_there_is_friction() -> None:
+def test_gaits_that_sway_are_refused_unless_there_is_friction():
     """A pace of go2 needs a coefficient of 0.52 = 165 mm / 316 mm; it slid and fell."""
     robot = judges.load("go2")
     feet = fb.Contacts.feet(robot).positions(robot.standing())
@@ -385,19 +372,19 @@ def test_gaits_that_sway_are_refused_unless_there_is_friction() -> None:
     refused(lambda: setattr(walk, "gait", Gait.pronk(robot)), InputError, "air")
 
 
-def test_a_biped_on_points_walks_by_default() -> None:
+def test_a_biped_on_points_walks_by_default():
     robot = fb.load("bolt", feet=["FL_FOOT", "FR_FOOT"])
     record = run(Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot)), 2.0)
     assert record.outcome == "completed" and np.linalg.norm(record.final.com[:2]) < 0.3
 
 
-def test_four_feet_walk_one_after_the_other() -> None:
+def test_four_feet_walk_one_after_the_other():
     record = run(walk_of("go2", Gait.walk, (0.2, 0.0)), 4.0)
     assert record.outcome == "completed" and tilt(record) < 1.0
     assert np.isclose(speed(record, 2.99, 3.99)[0], 0.2, rtol=0.05)  # one period
 
 
-def test_endless_standing_has_an_end_to_plan_for() -> None:
+def test_endless_standing_has_an_end_to_plan_for():
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot))
     state = robot.standing()
@@ -406,25 +393,23 @@ def test_endless_standing_has_an_end_to_plan_for() -> None:
     assert np.all(np.isfinite(stand(state.q, state.v, 1e4).tau))
 
 
-def test_the_path_gives_way_after_a_long_step() -> None:
+def test_the_path_continues_from_where_a_push_moved_the_robot():
     (calm, _), (record, _) = trot(), trot(200.0)
     moved = record.com[-1, 1] - calm.com[-1, 1]
     assert moved > 0.1  # it continues from where it was pushed, and does not run back
-    assert abs(record.final.com_velocity[1]) < 0.1 and np.isclose(
-        speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1
-    )
+    assert abs(record.final.com_velocity[1]) < 0.1
+    assert np.isclose(speed(record, 4.0, 4.5)[0], 0.3, rtol=0.1)
 
 
-def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches() -> None:
+def test_footholds_are_where_the_frame_goes_and_not_where_the_ball_touches():
     record, walk = trot()
     radius = walk.robot.foot("FL_foot").radius
     for step in list(walk.history)[-4:]:
         row = np.searchsorted(record.time, step.time + 0.05)
         for foot in step.stance:
             place = record.state(int(row)).point(foot)
-            assert (
-                np.linalg.norm(place - step.feet[foot]) < radius / 4
-            )  # a ball that rolls moves less than that in 50 ms
+            # a ball that rolls moves less than that in 50 ms
+            assert np.linalg.norm(place - step.feet[foot]) < radius / 4
             assert place[2] - radius < 2e-3
 
 
@@ -442,45 +427,43 @@ def farthest_from_plan(record: Rollout, walk: Walk, begin: float) -> float:
     )
 
 
-def test_the_load_shifts_before_a_first_step_that_is_far_away() -> None:
-    walk = walk_of(
-        "talos", lambda robot: Gait.walk(robot, start=5.5)
-    )  # beyond the 5 s that a plan looks ahead
+@pytest.mark.front_end
+def test_the_load_shifts_before_a_first_step_that_is_far_away():
+    # beyond the 5 s that a plan looks ahead
+    walk = walk_of("talos", lambda robot: Gait.walk(robot, start=5.5))
     sim = fb.Simulation(walk.robot)
     assert fb.rollout(sim, walk, 4.0, control_period=PERIOD).outcome == "completed"
     record = fb.rollout(sim, walk, 2.4, control_period=PERIOD)
-    assert (
-        record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02
-    )  # it was 7 cm
+    # it was 7 cm
+    assert record.outcome == "completed" and farthest_from_plan(record, walk, 5.4) < 0.02
 
 
-def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_stands() -> None:
+def test_the_load_shifts_before_the_first_step_of_a_gait_that_is_set_while_it_stands():
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=50.0))
     sim = fb.Simulation(walk.robot)
     fb.rollout(sim, walk, 0.5, control_period=PERIOD)
     walk.gait = Gait.crawl(walk.robot, swing=0.5, pause=0.3, start=1.5)
     record = fb.rollout(sim, walk, 2.0, control_period=PERIOD)
-    assert (
-        record.outcome == "completed"
-        and farthest_from_plan(record, walk, 1.4) < 0.02
-        and tilt(record) < 0.3
-    )
+    assert record.outcome == "completed"
+    assert farthest_from_plan(record, walk, 1.4) < 0.02
+    assert tilt(record) < 0.3
+    # its foot is unloaded
     assert (
         record.measured[record.time > 1.49][0].reshape(-1, 3)[:, 2].min() < 0.1 * walk.robot.weight
-    )  # its foot is unloaded
+    )
 
 
-def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing() -> None:
+def test_a_gait_whose_start_is_over_lifts_no_foot_in_the_middle_of_its_swing():
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=-0.15))
     record = run(walk, 1.0)
     assert record.outcome == "completed" and len(walk.history[0].stance) == 4
-    assert [step.time for step in walk.history][1] == pytest.approx(
-        0.1, abs=PERIOD
-    )  # the next lift-off of the schedule
+    # the next lift-off of the schedule
+    assert [step.time for step in walk.history][1] == pytest.approx(0.1, abs=PERIOD)
     assert record.measured[:, 2::3].max() < walk.robot.weight
 
 
-def test_the_zmp_does_not_jump_when_a_trot_stops() -> None:
+@pytest.mark.front_end
+def test_the_zmp_does_not_jump_when_a_trot_stops():
     """The planned ZMP jumped at that time, and rounding chose the value before or after it."""
     plans: list[fb.behaviours.StepPlan] = []
     walk = walk_of(
@@ -495,10 +478,10 @@ def test_the_zmp_does_not_jump_when_a_trot_stops() -> None:
     assert len(stops) == 3
     for before, after in stops:
         zmps = [before.plan.zmp(after.time - 1e-6), after.plan.zmp(after.time)]
-        np.testing.assert_allclose(zmps[1], zmps[0], atol=1e-5)
+        assert_allclose(zmps[1], zmps[0], atol=1e-5)
 
 
-def test_another_gait_takes_over_when_all_feet_stand() -> None:
+def test_another_gait_takes_over_when_all_feet_stand():
     walk = walk_of("go2", Gait.trot, (0.05, 0.0))
     sim = fb.Simulation(walk.robot)
     fb.rollout(sim, walk, 1.9, control_period=PERIOD)
@@ -511,10 +494,9 @@ def test_another_gait_takes_over_when_all_feet_stand() -> None:
     assert standing[0] == 4 and set(standing) == {3, 4}
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize(("name", "velocity"), [("go2", 0.1), ("solo12", 0.0)])
-def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(
-    name: str, velocity: float
-) -> None:
+def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(name, velocity):
     """The body was shifted for another foot; both robots fell within 0.5 s."""
     walk = walk_of(name, Gait.crawl, (velocity, 0.0))
     sim = fb.Simulation(walk.robot)
@@ -525,7 +507,7 @@ def test_a_crawl_that_begins_anew_waits_until_the_weight_has_shifted(
     assert lift_offs[0] == pytest.approx(3.3, abs=2 * PERIOD)
 
 
-def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked() -> None:
+def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked():
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.1), (0.1, 0.0))
     sim = fb.Simulation(walk.robot)
     for _ in range(10):
@@ -540,7 +522,8 @@ def test_the_same_gait_again_changes_nothing_and_one_that_comes_back_is_walked()
     assert len(walk.stance) == 2 and walk.gait is trot
 
 
-def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
+@pytest.mark.front_end
+def test_it_begins_anew_where_another_controller_had_the_robot():
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.0), (0.3, 0.0))
     standing = walk.robot.standing()
     walk(standing.q, standing.v)  # an earlier call, for example to look at the command
@@ -552,14 +535,12 @@ def test_it_begins_anew_where_another_controller_had_the_robot() -> None:
     other = Stand(walk.robot, fb.Contacts.feet(walk.robot))
     fb.rollout(sim, other, 3.0, control_period=PERIOD)
     record = fb.rollout(sim, walk, 1.0, control_period=PERIOD)  # after 3 s without a call
-    assert (
-        record.outcome == "completed"
-        and tilt(record) < 0.5
-        and walk.history[0].time == pytest.approx(4.0)
-    )
+    assert record.outcome == "completed"
+    assert tilt(record) < 0.5
+    assert walk.history[0].time == pytest.approx(4.0)
 
 
-def test_a_copy_of_a_robot_that_steps_stands() -> None:
+def test_a_copy_of_a_robot_that_steps_stands():
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
     run(stand, 0.6, fb.Push([0.0, 250.0, 0.0], start=0.3))
@@ -569,7 +550,7 @@ def test_a_copy_of_a_robot_that_steps_stands() -> None:
         assert not other.stepping
 
 
-def test_a_least_normal_force_bounds_the_ramps() -> None:
+def test_a_least_normal_force_bounds_the_ramps():
     walk = walk_of("go2", lambda robot: Gait.crawl(robot, start=0.4), min_normal_force=5.0)
     record = run(walk, 1.0)
     assert record.outcome == "completed"
@@ -580,7 +561,7 @@ def test_a_least_normal_force_bounds_the_ramps() -> None:
 # properties and errors ----------------------------------------------------------------------------
 
 
-def test_a_foothold_of_ones_own_is_taken() -> None:
+def test_feet_land_at_user_defined_footholds():
     asked = []
 
     def wider(foot: str, touchdown: float, walk: Walk) -> np.ndarray:
@@ -595,7 +576,7 @@ def test_a_foothold_of_ones_own_is_taken() -> None:
     assert np.isclose(width[1] - width[0], 0.06, atol=0.02)
 
 
-def test_a_walk_on_a_slope_follows_it() -> None:
+def test_a_walk_on_a_slope_follows_it():
     robot = judges.load("go2")
     angle = np.deg2rad(8.0)
     normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
@@ -610,7 +591,7 @@ def test_a_walk_on_a_slope_follows_it() -> None:
     assert np.isclose(climbed[2] / climbed[0], np.tan(angle), rtol=0.15)
 
 
-def test_copies_begin_anew_and_walk_alike() -> None:
+def test_a_copy_starts_again_and_walks_like_the_original():
     walk = walk_of("go2", Gait.trot, (0.2, 0.0))
     before = run(walk, 1.6)
     for other in (copy.deepcopy(walk), pickle.loads(pickle.dumps(walk))):
@@ -618,7 +599,7 @@ def test_copies_begin_anew_and_walk_alike() -> None:
         assert np.array_equal(run(other, 1.6).q, before.q)
 
 
-def test_what_does_not_fit_is_told_when_it_is_made() -> None:
+def test_invalid_arguments_are_refused_when_a_walk_is_made():
     robot = judges.load("go2")
     contacts, trot = fb.Contacts.feet(robot), Gait.trot(robot)
     walk, flying = Walk(robot, contacts, trot), Gait(dict.fromkeys(contacts.names, 0.0), 1.0, 0.5)
@@ -662,13 +643,12 @@ def test_what_does_not_fit_is_told_when_it_is_made() -> None:
             setattr(walk, name, getattr(walk, name, 0.2))
 
 
-@pytest.mark.parametrize("name", ["anymal_kinova", "hyq", "g1"])
-def test_the_other_robots_walk_with_the_same_settings(name: str) -> None:
+@pytest.mark.parametrize("name", judges.sampled(("anymal_kinova", "hyq", "g1"), "hyq"))
+def test_the_other_robots_walk_with_the_same_settings(name):
     record = run(walk_of(name, Gait.walk if name == "g1" else Gait.trot, (0.2, 0.0)), 3.0)
     assert record.outcome == "completed"
-    assert (
-        np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
-    )  # 2 s, in which it speeds up at 1 m/s²
+    # 2 s, in which it speeds up at 1 m/s²
+    assert np.linalg.norm(record.final.com[:2] - record.com[0, :2] - [0.38, 0.0]) < 0.1
 
 
 SEEDED = """
@@ -684,20 +664,16 @@ print(*record.contacts.names, *(hashlib.sha256(each.tobytes()).hexdigest() for e
 """
 
 
-def test_a_walk_does_not_depend_on_the_hash_seed() -> None:
-    answers = {
-        subprocess.run(
-            [sys.executable, "-c", SEEDED],
-            env={**os.environ, "PYTHONHASHSEED": str(seed)},
-            capture_output=True,
-            check=True,
-        ).stdout
-        for seed in range(4)
-    }
+@pytest.mark.front_end
+def test_a_walk_does_not_depend_on_the_hash_seed():
+    command, answers = [sys.executable, "-c", SEEDED], set()
+    for seed in range(4):
+        environment = os.environ | {"PYTHONHASHSEED": str(seed)}
+        answers.add(subprocess.check_output(command, env=environment))
     assert len(answers) == 1
 
 
-def test_a_walk_that_is_used_again_gives_the_same_record() -> None:
+def test_a_walk_that_is_used_again_gives_the_same_record():
     """A worker of a sweep uses one walk for many points, and stops at any stance."""
     walk = walk_of("go2", lambda robot: Gait.trot(robot, start=0.2), (0.3, 0.0))
     first, second, third = (run(walk, duration) for duration in (0.6, 0.34, 0.6))
@@ -707,8 +683,8 @@ def test_a_walk_that_is_used_again_gives_the_same_record() -> None:
         assert np.array_equal(getattr(third, name), getattr(first, name), equal_nan=True)
 
 
-@pytest.mark.parametrize("velocity", [(-0.3, 0.0), (0.0, 0.2)])
-def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity: tuple[float, float]) -> None:
+@pytest.mark.parametrize("velocity", [(-0.3, 0.0)])
+def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity):
     """With straight knees, solo12 fell within 3 s; half a step was longer than its legs reach."""
     with warns(SimulationWarning, "solo12", 2.0):
         walk = walk_of("solo12", Gait.crawl, velocity)
@@ -716,18 +692,17 @@ def test_a_crawl_is_limited_to_steps_that_the_legs_can_make(velocity: tuple[floa
     record = run(walk, 6.0)
     assert record.outcome == "completed"
     period = walk.gait.period
-    assert np.allclose(
-        speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period),
-        walk.speed_fraction * np.array(velocity),
-        atol=0.02,
-    )
+    expected = walk.speed_fraction * np.array(velocity)
+    assert np.allclose(speed(record, 6.0 - 1.5 * period, 6.0 - 0.5 * period), expected, atol=0.02)
     walk.velocity = 0.1 * np.array(velocity)
     assert walk.speed_fraction == 1.0
 
 
-def test_a_low_robot_trots_fast_with_short_swings() -> None:
-    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=0.2), (0.5, 0.0))
-    assert np.allclose(speed(run(walk, 4.0), 2.2, 3.8), [0.5, 0.0], atol=0.02)
+@pytest.mark.parametrize("swing", [0.2, 0.25])
+def test_a_low_robot_trots_fast(swing):
+    """The posture task moved the centre of mass of solo12 away from its plan, which cost speed."""
+    walk = walk_of("solo12", lambda robot: Gait.trot(robot, swing=swing), (0.5, 0.0))
+    assert np.allclose(speed(run(walk, 4.0), 1.9, 3.9), [0.5, 0.0], atol=0.02)  # whole periods
 
 
 def hexapod() -> Robot:
@@ -767,8 +742,8 @@ def hexapod() -> Robot:
 HEXAPOD_FEET = [f"{side}{row}" for side in "LR" for row in "FMH"]
 
 
-@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.0), (0.0, 0.15)])
-def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.2, 0.15)])
+def test_six_feet_walk_as_a_tripod(velocity):
     """The middle of three feet swayed a low body from side to side, and it fell within 1 s."""
     robot = hexapod()
     offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
@@ -780,10 +755,9 @@ def test_six_feet_walk_as_a_tripod(velocity: tuple[float, float]) -> None:
     assert np.allclose(speed(record, 1.39, 2.59), velocity, atol=0.02)
 
 
+@pytest.mark.front_end
 @pytest.mark.parametrize("velocity", [(0.0, 0.3), (0.5, 0.2)])
-def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
-    velocity: tuple[float, float],
-) -> None:
+def test_six_feet_walk_slowly_within_the_reach_of_their_legs(velocity):
     """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
     robot = hexapod()
     offsets = {foot: 0.0 if foot in ("LF", "RM", "LH") else 0.5 for foot in HEXAPOD_FEET}
@@ -793,9 +767,3 @@ def test_six_feet_walk_slowly_within_the_reach_of_their_legs(
         walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, velocity, 0.5)
     record = run(walk, 4.2)
     assert record.outcome == "completed" and tilt(record) < 2.0
-
-
-def test_the_posture_task_does_not_slow_a_trot_with_short_legs() -> None:
-    """It moved the centre of mass of solo12 away from its plan; the robot walked at 0.38 m/s."""
-    walk = walk_of("solo12", Gait.trot, (0.5, 0.0))
-    assert np.allclose(speed(run(walk, 4.0), 2.0, 3.5), [0.5, 0.0], atol=0.02)

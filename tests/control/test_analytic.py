@@ -16,6 +16,8 @@ from floatbase.control import AnalyticController
 from floatbase.objectives import centroidal_inertia
 
 PERIOD = 2e-3
+KINDS = ("solo8", "go2", "anymal_kinova", "talos")
+STANDING = judges.sampled(KINDS, "solo8", "talos")
 
 
 @cache
@@ -100,8 +102,8 @@ def written_out(name: str, state: fb.State) -> tuple[Array, Array, Array, float]
 # standing -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
-def test_robots_of_every_kind_stand_on_objectives_alone(name: str) -> None:
+@pytest.mark.parametrize("name", STANDING)
+def test_robots_of_every_kind_stand_on_objectives_alone(name):
     """1.5 s in MuJoCo with too few torques (solo8), enough (go2, solo12) and redundant ones.
 
     anymal_kinova has redundant torques, talos has flat feet.
@@ -113,8 +115,8 @@ def test_robots_of_every_kind_stand_on_objectives_alone(name: str) -> None:
     assert np.max(run.slip()) < 2e-3
 
 
-@pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
-def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(name: str) -> None:
+@pytest.mark.parametrize("name", STANDING)
+def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(name):
     run, robot = standing(name), judges.load(name)
     assert np.allclose(
         run.planned[-1].reshape(-1, 3).sum(axis=0),
@@ -130,20 +132,18 @@ def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(
     assert np.max(np.abs(planned - measured)) < 1e-4 * robot.weight
 
 
-def test_it_goes_where_its_centre_of_mass_is_to_be() -> None:
+def test_it_goes_where_its_centre_of_mass_is_to_be():
     robot = judges.load("go2")
     start = robot.standing()
     target = start.com + [0.02, -0.03, -0.02]
     controller = AnalyticController(robot, fb.Contacts.points(robot), start, com=target)
-    run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=PERIOD)
+    run = fb.rollout(fb.Simulation(robot), controller, 1.2, control_period=PERIOD)
     assert run.outcome == "completed"
     assert np.linalg.norm(run.com[-1] - target) < 2e-3
 
 
 @pytest.mark.parametrize("exponent", [3, 4, 6, 8])
-def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(
-    exponent: int,
-) -> None:
+def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lacks(exponent):
     """solo8 with joint angles off by 1e-6 rad and a velocity noise of 0.1 rad/s.
 
     Enforcing all rows exactly would need thousands of N·m.
@@ -163,9 +163,7 @@ def test_velocity_noise_near_a_loss_of_rank_asks_for_no_torque_that_a_motor_lack
 
 @pytest.mark.parametrize("name", judges.BALLS)
 @pytest.mark.parametrize("seed", [0, 1])
-def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(
-    name: str, seed: int
-) -> None:
+def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(name, seed):
     """The value agrees to 1e-6 everywhere.
 
     The answer itself agrees where weights of 1e-6 determine it beyond rounding.
@@ -187,8 +185,8 @@ def test_its_answer_is_the_optimum_of_the_objective_written_out_in_cvxpy(
     assert np.max(np.abs(command.qdd - qdd)) < 1e-2 * max(1.0, float(np.abs(qdd).max()))
 
 
-@pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
-def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
+@pytest.mark.parametrize("name", KINDS)
+def test_its_answer_satisfies_the_equations_of_motion(name):
     for seed in range(3):
         state, controller = near(name, seed), controller_of(name)
         command = controller(state.q, state.v)
@@ -202,7 +200,7 @@ def test_its_answer_satisfies_the_equations_of_motion(name: str) -> None:
         assert np.max(np.abs(eom.A @ command.qdd - held)) < 1e-7 * scale
 
 
-def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same() -> None:
+def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_same():
     """§4: the QP is a strict generalization.
 
     The same terms as tasks, with limits that are never reached, give the same torques.
@@ -225,14 +223,14 @@ def test_with_its_objective_and_no_limit_active_the_quadratic_program_gives_the_
         assert judges.relative(solution["forces"], command.forces) < 1e-6
 
 
-@pytest.mark.parametrize("name", ["solo8", "go2", "anymal_kinova", "talos"])
-def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(name: str) -> None:
+@pytest.mark.parametrize("name", KINDS)
+def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(name):
     for state in judges.states(name, 3):
         assert judges.relative(centroidal_inertia(state), inertia_about_com(state)) < 1e-9
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_robot_that_leans_is_turned_back(axis: int) -> None:
+def test_a_robot_that_leans_is_turned_back(axis):
     """The sign of τ̃_c: the planned change of angular momentum opposes the lean."""
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot)
@@ -267,7 +265,7 @@ def turned(state: fb.State, yaw: float) -> fb.State:
     return state.replace(q=q)
 
 
-def test_the_torques_do_not_depend_on_the_way_the_robot_faces() -> None:
+def test_the_torques_do_not_depend_on_the_way_the_robot_faces():
     """Rotation errors are world vectors.
 
     Rotating the desired posture and the state together changes nothing.
@@ -298,14 +296,14 @@ def pushed(controller: str, weights: float) -> fb.Rollout:
     return fb.rollout(fb.Simulation(robot), chosen, 1.0, pushes=[push], control_period=PERIOD)
 
 
-def test_a_light_push_costs_it_nothing() -> None:
+def test_it_withstands_a_light_push():
     run = pushed("analytic", 0.2)
     assert run.outcome == "completed"
     assert np.min(run.planned[:, 2::3]) > 1.0
     assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
 
 
-def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> None:
+def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls():
     """The controller plans a pull of more than 1 N at a foot; the ground never pulls.
 
     Within half a second the robot is down.
@@ -320,30 +318,23 @@ def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls() -> N
     assert run.measured[:, 2::3].min() >= 0.0
 
 
-def test_from_then_on_planned_and_measured_forces_have_nothing_to_do_with_each_other() -> None:
+def test_from_then_on_planned_and_measured_forces_have_nothing_to_do_with_each_other():
     run, weight = pushed("analytic", 0.5), judges.load("go2").weight
     gap = np.abs(run.planned - run.measured).max(axis=1) / weight
     before = run.time < 0.1
     assert gap[before][10:].max() < 0.05 and gap.max() > 1.0
 
 
-def test_it_then_asks_for_more_torque_than_the_motors_can_give() -> None:
+def test_it_then_asks_for_more_torque_than_the_motors_can_give():
     run, robot = pushed("analytic", 0.5), judges.load("go2")
     assert np.max(np.abs(run.tau_desired[run.time < 0.1]) - robot.torque_limits) < 0.0
     assert np.max(np.abs(run.tau_desired) - robot.torque_limits) > 10.0
     assert np.max(np.abs(run.tau) - robot.torque_limits) < 1e-9
 
 
-def test_the_quadratic_program_keeps_every_force_pushing_and_stands_through_the_same_push() -> None:
+def test_the_quadratic_program_keeps_every_force_pushing_and_stands_through_the_same_push():
     run, robot = pushed("qp", 0.5), judges.load("go2")
     assert run.outcome == "completed"
     assert np.min(run.planned[:, 2::3]) > -1e-6
     assert np.max(np.abs(run.tau_desired) - robot.torque_limits) < 1e-6
     assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
-
-
-def test_its_answer_prints_in_a_line() -> None:
-    state = judges.load("go2").standing()
-    command = controller_of("go2")(state.q, state.v)
-    assert repr(command).startswith("AnalyticCommand(|tau|=")
-    assert len(repr(command)) < 80

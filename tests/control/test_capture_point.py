@@ -39,7 +39,7 @@ def position_after(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_solution_is_that_of_a_qp_with_rows_from_pinocchio_and_qhull(name: str) -> None:
+def test_the_solution_is_that_of_a_qp_with_rows_from_pinocchio_and_qhull(name):
     robot, active = judges.load(name), 0
     contacts, standing = judges.stance(robot), robot.standing()
     for seed in range(4):
@@ -87,44 +87,36 @@ def test_the_solution_is_that_of_a_qp_with_rows_from_pinocchio_and_qhull(name: s
     assert active, "the inequality was never active: these states try nothing"
 
 
-def test_a_target_outside_the_support_polygon_makes_the_robot_fall_only_without_it() -> None:
+def simulate(tasks: list, inequalities: list, duration: float, *pushes: fb.Push) -> fb.Rollout:
+    """Simulate go2 with these tasks and inequalities."""
+    robot = judges.load("go2")
+    contacts = judges.stance(robot)
+    controller = fb.WholeBodyController(robot, contacts, tasks, inequalities=inequalities)
+    return fb.rollout(fb.Simulation(robot), controller, duration, pushes, control_period=2e-3)
+
+
+def test_a_target_outside_the_support_polygon_makes_the_robot_fall_only_without_it():
     robot = judges.load("go2")
     contacts, standing = judges.stance(robot), robot.standing()
     tasks = [fb.CoMTask(standing.com + [0.0, 0.2, 0.0]), *fb.standing_tasks(standing)[1:]]
-    runs = [
-        fb.rollout(
-            fb.Simulation(robot),
-            fb.WholeBodyController(robot, contacts, tasks, inequalities=inequalities),
-            1.5,
-            control_period=2e-3,
-        )
-        for inequalities in ([], [capture_point_inequality(0.03)])
-    ]
+    runs = [simulate(tasks, rows, 1.5) for rows in ([], [capture_point_inequality(0.03)])]
     assert runs[0].outcome != "completed" and runs[1].outcome == "completed"
     edges, end = polygon(runs[1].final, contacts), runs[1].final.com
     inside = -np.max(edges[:, :2] @ end[:2] + edges[:, 2])
     assert 0.0 < inside < 0.06 and end[1] > standing.com[1] + 0.05  # it leans towards the target
 
 
-def test_a_push_that_topples_a_soft_controller_does_not_topple_it_with_the_inequality() -> None:
+def test_a_push_that_topples_a_soft_controller_does_not_topple_it_with_the_inequality():
     robot = judges.load("go2")
-    contacts, standing = judges.stance(robot), robot.standing()
+    standing = robot.standing()
     tasks = [fb.CoMTask(standing.com, kp=10.0), *fb.standing_tasks(standing)[1:]]
     push = fb.Push([0.0, 180.0, 0.0], start=0.1, duration=0.1)
-    outcomes = [
-        fb.rollout(
-            fb.Simulation(robot),
-            fb.WholeBodyController(robot, contacts, tasks, inequalities=inequalities),
-            1.2,
-            [push],
-            control_period=2e-3,
-        ).outcome
-        for inequalities in ([], [capture_point_inequality(0.02, horizon=0.02)])
-    ]
-    assert outcomes[0] != "completed" and outcomes[1] == "completed"
+    inequality = capture_point_inequality(0.02, horizon=0.02)
+    runs = [simulate(tasks, rows, 1.2, push) for rows in ([], [inequality])]
+    assert runs[0].outcome != "completed" and runs[1].outcome == "completed"
 
 
-def test_without_a_support_polygon_or_above_the_centre_of_mass_there_are_no_rows() -> None:
+def test_without_a_support_polygon_or_above_the_centre_of_mass_there_are_no_rows():
     robot = judges.load("go2")
     state, inequality = robot.standing(), capture_point_inequality()
     two = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"])

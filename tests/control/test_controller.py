@@ -28,9 +28,9 @@ def cases(name: str, n: int) -> list[State]:
 
 
 @pytest.mark.parametrize(
-    ("name", "n"), [(name, 100 if name == "go2" else 20) for name in judges.ROBOTS]
+    ("name", "n"), [(name, 40 if name == "go2" else 20) for name in judges.ROBOTS]
 )
-def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
+def test_daqp_finds_the_optimum_that_cvxpy_finds(name, n):
     controller, n_active = judges.controller_of(name), 0
     for state in cases(name, n):
         qp = controller.qp(state)
@@ -56,7 +56,7 @@ def test_daqp_finds_the_optimum_that_cvxpy_finds(name: str, n: int) -> None:
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: str) -> None:
+def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name):
     controller = judges.controller_of(name)
     for state in cases(name, 10):
         command = controller(state.q, state.v)
@@ -65,7 +65,7 @@ def test_the_planned_acceleration_is_what_torques_and_forces_bring_about(name: s
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) -> None:
+def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name):
     """Finite differences of the rolling feet's centres, which move with ω × r n."""
     controller = judges.controller_of(name)
     for state in judges.states(name, 3, 0.2) if name != "solo8" else []:
@@ -82,7 +82,7 @@ def test_the_planned_acceleration_keeps_the_feet_from_accelerating(name: str) ->
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str) -> None:
+def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name):
     controller, robot = judges.controller_of(name), judges.load(name)
     for state in cases(name, 20):
         command = controller(state.q, state.v)
@@ -95,7 +95,7 @@ def test_forces_stay_in_the_exact_cone_and_torques_within_their_limits(name: str
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) -> None:
+def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name):
     controller, robot = judges.controller_of(name, min_normal_force=1.0), judges.load(name)
     seen = set()
     for state in cases(name, 20):
@@ -109,9 +109,8 @@ def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) ->
             assert command.multipliers[row] > 0
             if row.startswith("torque limit "):
                 joint, side = row.removeprefix("torque limit ").split()
-                assert torques[joint] == pytest.approx(
-                    limits[joint] * {"upper": 1, "lower": -1}[side], abs=1e-6
-                )
+                expected = limits[joint] * {"upper": 1, "lower": -1}[side]
+                assert torques[joint] == pytest.approx(expected, abs=1e-6)
                 seen.add("torque")
             elif row.endswith(" normal force"):
                 assert forces[row.removesuffix(" normal force")][2] == pytest.approx(1.0, abs=1e-6)
@@ -129,24 +128,22 @@ def test_an_active_row_is_met_exactly_and_named_for_what_it_limits(name: str) ->
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name: str) -> None:
+def test_a_robot_at_rest_is_carried_by_forces_that_sum_to_its_weight(name):
     state = judges.load(name).standing()
     command = judges.controller_of(name)(state.q, state.v)
     forces = command.forces.reshape(-1, 3)
-    assert np.allclose(
-        forces.sum(axis=0), [0.0, 0.0, state.robot.weight], atol=SAG * state.robot.weight
-    )
+    expected = [0.0, 0.0, state.robot.weight]
+    assert np.allclose(forces.sum(axis=0), expected, atol=SAG * state.robot.weight)
     moment = np.cross(judges.stance(state.robot).positions(state) - state.com, forces).sum(axis=0)
     assert np.allclose(moment, 0.0, atol=SAG * state.robot.weight)
     assert np.allclose(command.qdd[:6], 0.0, atol=0.05)
-    assert np.allclose(
-        command.qdd[6:], 0.0, atol=0.6
-    )  # 0.5 rad/s² where anymal_kinova's arm begins
+    # 0.5 rad/s² where anymal_kinova's arm begins
+    assert np.allclose(command.qdd[6:], 0.0, atol=0.6)
     # grippers of talos rest at their limits
     assert all("position" in row for row in command.active)
 
 
-def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
+def test_an_arm_bolted_to_the_ground_gets_computed_torque():
     """Without active limits, (1) gives τ = M (-kp e - kd ė) + h in closed form."""
     robot = judges.load("ur5")
     target = robot.standing().q
@@ -158,7 +155,7 @@ def test_an_arm_bolted_to_the_ground_gets_computed_torque() -> None:
         assert np.allclose(controller(state.q, state.v).tau, expected, atol=1e-5)
 
 
-def test_nothing_can_hold_a_robot_that_touches_nothing() -> None:
+def test_a_robot_without_contacts_falls_freely():
     robot = judges.load("go2")
     state = robot.standing()
     controller = fb.WholeBodyController(robot, fb.Contacts.none(), fb.standing_tasks(state))
@@ -168,7 +165,7 @@ def test_nothing_can_hold_a_robot_that_touches_nothing() -> None:
     assert np.allclose(fall, [0.0, 0.0, -9.81], atol=1e-5)
 
 
-def test_tasks_are_met_when_nothing_limits_them() -> None:
+def test_tasks_are_met_when_nothing_limits_them():
     robot = judges.load("go2")
     for state in judges.states("go2", 5, 0.02):
         feed = np.array([0.3, -0.2, 0.5])
@@ -182,7 +179,7 @@ def test_tasks_are_met_when_nothing_limits_them() -> None:
         )
 
 
-def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
+def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone():
     """Newton: the sideways acceleration is at most μ g while the feet carry the weight."""
     robot = judges.load("go2")
     state = robot.standing()
@@ -203,9 +200,7 @@ def test_a_sideways_acceleration_beyond_friction_is_cut_at_the_cone() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
-    backend: str,
-) -> None:
+def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(backend):
     """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides.
 
     Without rotation, one of the sides faces forwards.
@@ -229,7 +224,7 @@ def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(
         assert reached(rotation + quarter, rotation) == pytest.approx(0.3, abs=ASIDE)
 
 
-def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled() -> None:
+def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled():
     """Every second one of 2 n outer facets is one of n facets.
 
     Inner polyhedra of n and 2 n facets have different edges, so neither contains the other.
@@ -250,7 +245,7 @@ def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled() -> None
         assert inside[-1] - outside[-1] <= 0.1 * (inside[0] - outside[0]) + slack
 
 
-def test_the_smallest_normal_force_is_kept_on_every_point() -> None:
+def test_the_smallest_normal_force_is_kept_on_every_point():
     controller = judges.controller_of("go2", min_normal_force=7.0)
     lowest = [
         controller(s.q, s.v).forces.reshape(-1, 3)[:, 2].min()
@@ -259,7 +254,7 @@ def test_the_smallest_normal_force_is_kept_on_every_point() -> None:
     assert min(lowest) == pytest.approx(7.0, abs=1e-6)
 
 
-def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
+def test_normal_forces_are_along_the_normals_of_tilted_ground():
     robot = judges.load("go2")
     normals = judges.random_normals(4, 1)
     contacts = fb.Contacts.points(robot, mu=0.4, normals=normals)
@@ -275,7 +270,7 @@ def test_normal_forces_are_along_the_normals_of_tilted_ground() -> None:
         )
 
 
-def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
+def test_torque_limits_are_the_robots_or_those_given_or_none():
     state = judges.states("go2", 1, 0.1)[0]
     robot = state.robot
     assert np.array_equal(judges.controller_of("go2").limits.torque_limits, robot.torque_limits)
@@ -294,20 +289,18 @@ def test_torque_limits_are_the_robots_or_those_given_or_none() -> None:
     ]
 
 
-def test_every_row_of_the_problem_has_a_name_of_its_own() -> None:
+def test_every_row_of_the_problem_has_a_unique_name():
     for name in judges.ROBOTS:
         qp = judges.controller_of(name).qp(judges.load(name).standing())
         assert len(set(qp.equality_names)) == len(qp.equality_names) == len(qp.A)
         assert len(set(qp.inequality_names)) == len(qp.inequality_names) == len(qp.G)
 
 
-def test_the_order_of_tasks_and_of_contacts_does_not_matter() -> None:
+def test_the_order_of_tasks_and_of_contacts_does_not_matter():
     robot = judges.load("go2")
-    state, tasks, contacts = (
-        robot.random_state(3),
-        fb.standing_tasks(robot.standing()),
-        fb.Contacts.points(robot),
-    )
+    state = robot.random_state(3)
+    tasks = fb.standing_tasks(robot.standing())
+    contacts = fb.Contacts.points(robot)
     turned = fb.Contacts.points(robot, frames=contacts.names[::-1])
     stances = ((contacts, tasks), (contacts, tasks[::-1]), (turned, tasks))
     one, two, three = (fb.WholeBodyController(robot, *given)(state.q, state.v) for given in stances)
@@ -316,7 +309,7 @@ def test_the_order_of_tasks_and_of_contacts_does_not_matter() -> None:
     assert np.allclose(one.forces.reshape(4, 3), three.forces.reshape(4, 3)[::-1], atol=1e-6)
 
 
-def test_the_same_state_gets_the_same_answer_whatever_came_before() -> None:
+def test_the_same_state_gets_the_same_answer_whatever_came_before():
     controller = judges.controller_of("go2")
     state, other = judges.states("go2", 2)
     first = controller(state.q, state.v)
@@ -326,7 +319,7 @@ def test_the_same_state_gets_the_same_answer_whatever_came_before() -> None:
     assert first.active == again.active
 
 
-def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
+def test_regularisation_is_added_where_it_is_missing_and_shown():
     robot = judges.load("go2")
     contacts, tasks = fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
     added = fb.WholeBodyController(robot, contacts, tasks).tasks[len(tasks) :]
@@ -335,16 +328,10 @@ def test_regularisation_is_added_where_it_is_missing_and_shown() -> None:
     assert fb.WholeBodyController(robot, contacts, own).tasks == tuple(own)
 
 
-def test_a_controller_is_replaced_rather_than_changed() -> None:
+def test_a_controller_is_replaced_rather_than_changed():
     robot = judges.load("go2")
-    controller = judges.controller_of(
-        "go2",
-        facets=8,
-        inner_approximation=False,
-        min_normal_force=3.0,
-        torque_limits=20.0,
-        solver="cvxpy",
-    )
+    limits = {"facets": 8, "inner_approximation": False, "min_normal_force": 3.0}
+    controller = judges.controller_of("go2", torque_limits=20.0, solver="cvxpy", **limits)
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
     assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)
@@ -357,7 +344,7 @@ def test_a_controller_is_replaced_rather_than_changed() -> None:
     assert [type(task) for task in other.tasks] == [fb.PostureTask, fb.ForceTask, fb.TorqueTask]
 
 
-def test_anything_of_the_form_of_a_task_is_a_task() -> None:
+def test_anything_of_the_form_of_a_task_is_a_task():
     robot = judges.load("go2")
     command = fb.WholeBodyController(robot, fb.Contacts.points(robot), [judges.KeepStill()])(
         robot.standing().q, np.zeros(18)
@@ -367,8 +354,8 @@ def test_anything_of_the_form_of_a_task_is_a_task() -> None:
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_nearly_as_possible(
-    name: str,
-) -> None:
+    name,
+):
     """J of solo8 loses rank: A q̈ = b holds in the least-squares sense, exactly where possible."""
     controller = judges.controller_of(name)
     for state in judges.states(name, 5, 0.3):
@@ -383,7 +370,7 @@ def test_feet_whose_rows_are_inconsistent_with_a_measured_velocity_are_kept_as_n
 # infeasible ---------------------------------------------------------------------------------------
 
 
-def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict() -> None:
+def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict():
     controller = judges.controller_of("go2", min_normal_force=500.0)
     state = judges.load("go2").standing()
     with pytest.raises(InfeasibleError) as caught:
@@ -401,7 +388,7 @@ def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict() -> None
     assert judges.is_smallest_conflict(controller.qp(state), caught.value.constraints)
 
 
-def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
+def test_an_answer_that_is_wrong_shows_in_its_residuals():
     state = judges.load("go2").random_state(0)
     found = solve(judges.controller_of("go2").qp(state))
     wrong = Solution(found.qp, found.x + 0.01, found.inequality_multipliers + 0.1, "wrong")
@@ -412,7 +399,7 @@ def test_an_answer_that_is_wrong_shows_in_its_residuals() -> None:
 # arguments ----------------------------------------------------------------------------------------
 
 
-def test_any_solver_can_drive_a_controller() -> None:
+def test_any_solver_can_drive_a_controller():
     state, expected = judges.load("go2").random_state(1), judges.controller_of("go2")
     for solver in ("daqp", "cvxpy", "active_set"):
         command = judges.controller_of("go2", solver=solver, backend="reference")(state.q, state.v)
@@ -423,14 +410,12 @@ def test_any_solver_can_drive_a_controller() -> None:
         assert np.allclose(command.tau, expected(state.q, state.v).tau, atol=1e-4)
 
 
-def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands() -> None:
+def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands():
     from floatbase.dynamics import fixed_frame
 
     robot = judges.load("go2")
-    feet, bolts = (
-        fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"]),
-        fb.Contacts([fixed_frame("base")]),
-    )
+    feet = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"])
+    bolts = fb.Contacts([fixed_frame("base")])
     tasks = fb.standing_tasks(robot.standing())
     state = robot.random_state(3, 0.05)
     first = fb.WholeBodyController(robot, bolts + feet, tasks)(state.q, state.v)
@@ -439,7 +424,7 @@ def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_s
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_solo8_sways_near_its_singular_stance_without_accelerations_due_to_noise() -> None:
+def test_solo8_sways_near_its_singular_stance_without_accelerations_due_to_noise():
     robot = judges.load("solo8")
     state = robot.standing()
 
@@ -454,7 +439,7 @@ def test_solo8_sways_near_its_singular_stance_without_accelerations_due_to_noise
     assert record.outcome == "completed", record.error
 
 
-def test_inconsistent_motions_are_named_and_not_averaged() -> None:
+def test_inconsistent_motions_are_named_and_not_averaged():
     from floatbase.dynamics import moving_frame
 
     robot = judges.load("go2")
@@ -468,7 +453,7 @@ def test_inconsistent_motions_are_named_and_not_averaged() -> None:
     assert e.value.constraints == ("motion FL_foot z", "motion drive of FL_foot row 2")
 
 
-def test_limits_keep_their_own_copy() -> None:
+def test_limits_keep_their_own_copy():
     from floatbase.control import Limits
 
     mine = np.full(12, 20.0)
@@ -478,7 +463,7 @@ def test_limits_keep_their_own_copy() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend: str) -> None:
+def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend):
     robot = judges.load("talos")
     contacts, state = fb.Contacts.flat_feet(robot), robot.standing()
     command = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state), backend=backend)(
@@ -494,7 +479,7 @@ def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend: str
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_infeasible_tick_is_answered_with_soft_constraints_on_request(backend: str) -> None:
+def test_an_infeasible_tick_is_answered_with_soft_constraints_on_request(backend):
     robot = judges.load("talos")
     contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
     weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}

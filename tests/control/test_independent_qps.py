@@ -18,7 +18,7 @@ import constraints  # noqa: E402
 
 
 @pytest.mark.parametrize("kind", constraints.KINDS)
-def test_torques_and_verdicts_are_those_of_an_independent_qp(kind: str) -> None:
+def test_torques_and_verdicts_are_those_of_an_independent_qp(kind):
     solved = 0
     for name in ("go2", "solo12"):
         seeds = np.random.default_rng(5).integers(1_000_000, size=2).tolist()
@@ -29,7 +29,7 @@ def test_torques_and_verdicts_are_those_of_an_independent_qp(kind: str) -> None:
     assert solved or kind == "joint limits"  # hard limits may all be infeasible
 
 
-def test_later_levels_always_have_a_solution() -> None:
+def test_later_levels_always_have_a_solution():
     """Rows that earlier levels keep depend nearly on each other in these problems."""
     result = constraints.compare("priorities", judges.load("talos"), [3, 8, 18])
     assert result.verdicts == 0 and max(result.differences) < constraints.REQUIRED

@@ -31,7 +31,7 @@ def limits_of(n: int, rng: np.random.Generator, **changes: object) -> JointLimit
 
 
 @pytest.mark.parametrize("dt", PERIODS)
-def test_accelerations_within_the_bounds_keep_a_joint_inside_for_ever(dt: float) -> None:
+def test_accelerations_within_the_bounds_keep_a_joint_inside_for_ever(dt):
     rng = np.random.default_rng(0)
     limits = limits_of(300, rng)
     q, v, side = rng.uniform(-1.0, 1.0, 300), np.zeros(300), np.ones(300)
@@ -45,7 +45,7 @@ def test_accelerations_within_the_bounds_keep_a_joint_inside_for_ever(dt: float)
         assert np.max(np.abs(q)) < 1.0 + 1e-9 and np.max(np.abs(v)) < 5.0 + 1e-9
 
 
-def test_the_bounds_forbid_no_motion_that_could_still_stop() -> None:
+def test_the_bounds_forbid_no_motion_that_could_still_stop():
     """At the bound, a joint that brakes from the next period on stops just at its limit."""
     rng = np.random.default_rng(1)
     limits = replace(limits_of(1000, rng), velocity=np.full(1000, np.inf))
@@ -57,7 +57,7 @@ def test_the_bounds_forbid_no_motion_that_could_still_stop() -> None:
     assert np.sum(viable) > 300 and np.allclose(stop[viable], 1.0, atol=1e-9)
 
 
-def test_a_joint_beyond_its_limit_returns_and_one_at_its_limit_may_rest() -> None:
+def test_a_joint_beyond_its_limit_returns_and_one_at_its_limit_may_rest():
     limits = limits_of(3, np.random.default_rng(2))
     least, largest = limits.bounds([1.0, -1.0, 1.1], [0.0, 0.0, 0.0])
     assert largest[0] == least[1] == 0.0
@@ -83,9 +83,10 @@ def near_limits(robot: Robot, n: int, seed: int = 0) -> list[State]:
     return states
 
 
-@pytest.mark.parametrize("name", ["go2", "talos", "solo12", "hyq", "anymal_kinova"])
-@pytest.mark.parametrize("weight", [None, 30.0, 1e4])
-def test_both_backends_agree_near_limits(name: str, weight: float | None) -> None:
+@pytest.mark.parametrize(
+    ("name", "weight"), [("go2", None), ("hyq", 1e4), ("solo12", 30.0), ("talos", 30.0)]
+)
+def test_both_backends_agree_near_limits(name, weight):
     robot = judges.load(name)
     limits = JointLimits.of(robot, weight=weight)
     compiled, reference = judges.pair(robot, judges.stance(robot), joint_limits=limits)
@@ -138,8 +139,8 @@ def accelerations_within(limits: JointLimits, q: float, v: float, j: int) -> tup
     return bounds[0], bounds[1]
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_torques_against_a_qp_written_from_pinocchio_quantities(name: str) -> None:
+@pytest.mark.parametrize("name", judges.sampled(("go2", "talos"), "go2"))
+def test_torques_against_a_qp_written_from_pinocchio_quantities(name):
     robot = judges.load(name)
     contacts, standing = judges.stance(robot), robot.standing()
     limits = JointLimits.of(robot, weight=None)
@@ -194,10 +195,9 @@ def driven(robot: Robot, joint: int, side: float, period: float, **options: obje
 
 
 @pytest.mark.parametrize(
-    ("name", "joints"),
-    [("go2", (0, 1, 2)), ("solo12", (1, 5)), ("talos", (3, 9, 15, 21))],
+    ("name", "joints"), [("go2", (0, 1, 2)), ("solo12", (1, 5)), ("talos", (3, 9, 15, 21))]
 )
-def test_no_joint_passes_its_limit_in_mujoco(name: str, joints: tuple[int, ...]) -> None:
+def test_no_joint_passes_its_limit_in_mujoco(name, joints):
     floating = judges.load(name)
     robot = fb.load_urdf(
         floating.urdf, name=name, floating=False, package_dirs=floating.package_dirs,
@@ -221,7 +221,7 @@ def test_no_joint_passes_its_limit_in_mujoco(name: str, joints: tuple[int, ...])
     assert beyond > OVERSHOOT * span[joints[-1]] or speed > limits.velocity[joints[-1]]
 
 
-def test_active_limits_are_named_for_joint_kind_and_side() -> None:
+def test_active_limits_are_named_for_joint_kind_and_side():
     robot = judges.load("go2")
     joint = robot.joint_names.index("FL_calf_joint")
     limits = JointLimits.of(robot, weight=None)
@@ -250,7 +250,7 @@ def test_active_limits_are_named_for_joint_kind_and_side() -> None:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_what_cannot_hold_is_violated_and_named(backend: str) -> None:
+def test_impossible_soft_constraints_are_violated_and_named(backend):
     """An impossible inequality, a squeezed force and a joint beyond its limit, all at once."""
     robot = judges.load("go2")
     standing = robot.standing()
@@ -284,7 +284,7 @@ def test_what_cannot_hold_is_violated_and_named(backend: str) -> None:
     assert np.allclose(eom.A @ command.qdd, eom.b, atol=1e-6)  # the contacts still hold
 
 
-def test_a_soft_force_bound_holds_while_it_can() -> None:
+def test_a_soft_force_bound_holds_while_it_can():
     robot = judges.load("go2")
     standing, contacts = robot.standing(), judges.stance(robot)
     bounds = {"FL_foot": lambda t: 10.0 + 500.0 * t}
@@ -302,7 +302,7 @@ def test_a_soft_force_bound_holds_while_it_can() -> None:
                 assert command.violations[name] == pytest.approx(510.0 - force, abs=1e-6)
 
 
-def test_limits_are_the_robots_by_default_and_can_be_off() -> None:
+def test_limits_are_the_robots_by_default_and_can_be_off():
     robot = judges.load("go2")
     default = judges.controller_of("go2")
     assert np.array_equal(default.limits.joint_limits.upper, robot.model.upperPositionLimit[7:])
@@ -315,7 +315,7 @@ def test_limits_are_the_robots_by_default_and_can_be_off() -> None:
     }  # fmt: skip
 
 
-def test_braking_follows_the_torque_limits_of_the_controller() -> None:
+def test_braking_follows_the_torque_limits_of_the_controller():
     robot = judges.load("go2")
     weak = judges.controller_of("go2", torque_limits=2.0).limits.joint_limits
     assert np.array_equal(weak.braking, JointLimits.of(robot, torque_limits=2.0).braking)
@@ -332,7 +332,7 @@ def test_braking_follows_the_torque_limits_of_the_controller() -> None:
         Limits.of(robot, facet=8)
 
 
-def test_soft_bounds_have_rows_only_where_there_are_bounds() -> None:
+def test_soft_bounds_have_rows_only_where_there_are_bounds():
     robot = judges.load("go2")
     for bounds, rows in (
         ({}, set()),
@@ -347,7 +347,7 @@ def test_soft_bounds_have_rows_only_where_there_are_bounds() -> None:
         assert judges.difference(*both, robot.standing()) < judges.agreement(robot)
 
 
-def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind() -> None:
+def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind():
     """Rows of weight 1e8 that are violated only during the search leave their penalty behind."""
     robot = judges.load("go2")
     rng = np.random.default_rng(4)
@@ -360,7 +360,7 @@ def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind() -> None:
         assert judges.difference(*both, state) < 1e-6 * robot.torque_limits.max()
 
 
-def test_joint_limits_that_do_not_fit_are_refused() -> None:
+def test_joint_limits_that_do_not_fit_are_refused():
     robot, limits = judges.load("go2"), limits_of(3, np.random.default_rng(0))
     with raises(InputError, "joint limits", "3", "12"):
         judges.controller_of("go2", joint_limits=limits)

@@ -39,7 +39,7 @@ def controller(**options: object) -> fb.WholeBodyController:
     )
 
 
-def test_it_changes_the_problem_that_is_solved_and_no_other_is() -> None:
+def test_it_changes_the_problem_that_is_solved_and_no_other_is():
     state = GO2.random_state(1, 0.05)
     plain, even = controller(backend="reference"), controller(modify_qp=with_even_knees)
     index = [GO2.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR")]
@@ -50,7 +50,7 @@ def test_it_changes_the_problem_that_is_solved_and_no_other_is() -> None:
     assert all(np.array_equal(getattr(same, part), getattr(before, part)) for part in PARTS)
 
 
-def test_it_takes_the_reference_backend_and_says_so() -> None:
+def test_modify_qp_takes_the_reference_backend_and_the_reason_names_it():
     state = GO2.standing()
     even = controller(modify_qp=with_even_knees)
     assert even.backend == "reference" and "modify_qp" in even.backend_reason
@@ -64,7 +64,7 @@ def test_it_takes_the_reference_backend_and_says_so() -> None:
         assert other.qp(state).equality_names[-1] == "even knees"
 
 
-def test_a_walk_hands_it_to_the_controllers_of_all_stances() -> None:
+def test_a_walk_hands_it_to_the_controllers_of_all_stances():
     seen = set()
 
     def watch(qp: QP, eom: fb.EquationsOfMotion) -> QP:

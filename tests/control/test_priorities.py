@@ -24,7 +24,7 @@ def levels_of(robot: Robot, state: State) -> list[list[object]]:
     ]
 
 
-def test_without_inequalities_levels_are_null_space_projections() -> None:
+def test_without_inequalities_levels_are_null_space_projections():
     """q̈ = J₁⁺ e₁ + (J₂ N₁)⁺ (e₂ - J₂ J₁⁺ e₁) + …, with N₁ = 1 - J₁⁺ J₁."""
     robot = judges.load("ur5")
     frame, rng = robot.frames[-1], np.random.default_rng(0)
@@ -48,7 +48,7 @@ def test_without_inequalities_levels_are_null_space_projections() -> None:
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "solo12", "hyq", "anymal_kinova"])
-def test_each_level_is_optimal_among_the_optima_of_the_levels_before(name: str) -> None:
+def test_each_level_is_optimal_among_the_optima_of_the_levels_before(name):
     robot = judges.load(name)
     contacts, standing = judges.stance(robot), robot.standing()
     limits = JointLimits.of(robot, weight=None)
@@ -87,7 +87,7 @@ def test_each_level_is_optimal_among_the_optima_of_the_levels_before(name: str) 
     assert solved > 0 and active > 0
 
 
-def test_large_weights_approach_strict_priorities() -> None:
+def test_large_weights_approach_strict_priorities():
     robot = judges.load("go2")
     contacts, state = judges.stance(robot), robot.standing()
     com = fb.CoMTask(state.com + [0.3, 0.0, 0.0], kp=100.0)
@@ -101,7 +101,7 @@ def test_large_weights_approach_strict_priorities() -> None:
     assert gaps[0] > 10.0 * gaps[1] > 100.0 * gaps[2]
 
 
-def test_levels_are_answered_by_the_reference_backend() -> None:
+def test_levels_are_answered_by_the_reference_backend():
     robot = judges.load("go2")
     contacts, state = judges.stance(robot), robot.standing()
     levels = levels_of(robot, state)
@@ -129,7 +129,7 @@ def test_levels_are_answered_by_the_reference_backend() -> None:
         fb.WholeBodyController(robot, contacts, levels, modify_qp=lambda qp, eom: qp)
 
 
-def test_levels_with_soft_contacts_and_soft_limits() -> None:
+def test_levels_with_soft_contacts_and_soft_limits():
     robot = judges.load("go2")
     contacts, state = judges.stance(robot), robot.standing()
     controller = fb.WholeBodyController(
@@ -145,9 +145,7 @@ def test_levels_with_soft_contacts_and_soft_limits() -> None:
 
 
 @pytest.mark.parametrize("name", ["go2", "solo12"])
-def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(name, monkeypatch):
     """A hundred times larger tolerance of rounding used to move torques by 1e-5 N·m."""
     robot = judges.load(name)
     limits = JointLimits.of(robot, weight=None)

@@ -29,9 +29,7 @@ def moving_controller(backend: str, **options: object) -> fb.WholeBodyController
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_array_of_targets_replaces_the_targets_of_the_tasks(
-    backend: str,
-) -> None:
+def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend):
     controller, rng = moving_controller(backend), np.random.default_rng(0)
     for state in judges.states("go2", 5, 0.05):
         t = float(rng.uniform(0.0, 0.1))
@@ -50,7 +48,7 @@ def test_an_array_of_targets_replaces_the_targets_of_the_tasks(
         assert max(vars(command.solution.residuals).values()) < 1e-6
 
 
-def test_both_backends_agree_on_targets_and_targets_do_not_change_a_controller() -> None:
+def test_both_backends_agree_on_targets_and_targets_do_not_change_a_controller():
     compiled, reference = moving_controller("compiled"), moving_controller("reference")
     rng = np.random.default_rng(0)
     assert dict(compiled.targets) == dict(reference.targets)
@@ -66,7 +64,7 @@ def test_both_backends_agree_on_targets_and_targets_do_not_change_a_controller()
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_targets_are_checked(backend: str) -> None:
+def test_targets_are_checked(backend):
     controller, state = moving_controller(backend), GO2.standing()
     good = controller.targets_at(0.0)
     refused(lambda: controller(state.q, state.v, 0.0, good[1:]), InputError, good.size)
@@ -89,7 +87,7 @@ def infeasible(**options: object) -> tuple[fb.WholeBodyController, fb.State]:
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_attempt_says_no_where_a_call_gives_the_reasons(backend: str) -> None:
+def test_an_attempt_returns_none_where_a_call_raises_an_error(backend):
     controller, state = infeasible(backend=backend)
     rest = TALOS.standing()
     assert controller.attempt(state.q, state.v) is None
@@ -102,14 +100,14 @@ def test_an_attempt_says_no_where_a_call_gives_the_reasons(backend: str) -> None
         refused(lambda bad=bad: controller.attempt(rest.q, bad), InputError)
 
 
-def test_an_attempt_softens_as_a_call_does() -> None:
+def test_an_attempt_softens_as_a_call_does():
     controller, state = infeasible(on_infeasible="soften")
     attempt, command = controller.attempt(state.q, state.v), controller(state.q, state.v)
     assert attempt.softened and attempt.backend == "compiled"
     assert np.array_equal(attempt.tau, command.tau)
 
 
-def test_a_no_takes_no_longer_than_a_few_answers() -> None:
+def test_a_no_takes_no_longer_than_a_few_answers():
     controller, state = infeasible()
     rest, times = TALOS.standing(), {}
     for name, each in (("yes", rest), ("no", state)):

@@ -120,7 +120,7 @@ def world_acceleration(state: fb.State, qdd: Array) -> tuple[Array, Array]:
 # any A q̈ = b -------------------------------------------------------------------------------------
 
 
-def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_multipliers() -> None:
+def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_multipliers():
     rng = np.random.default_rng(0)
     state = judges.load("go2").random_state(1)
     A, b = rng.normal(size=(4, 18)), rng.normal(size=4)
@@ -129,23 +129,20 @@ def test_the_motion_keeps_a_linear_constraint_whose_force_is_its_rows_times_mult
         state, fb.Contacts.points(state.robot, frames=["FL_foot"]) + fb.Contacts([constraint])
     )
     tau = rng.normal(size=12)
-    qdd, forces = (
-        dynamics.accelerations_from_torques(eom)(tau),
-        dynamics.forces_from_torques(eom)(tau),
-    )
+    qdd = dynamics.accelerations_from_torques(eom)(tau)
+    forces = dynamics.forces_from_torques(eom)(tau)
     assert np.allclose(A @ qdd, b, atol=1e-8)
     J_foot = (
         judges.mujoco_of("go2")
         .move_to(state)
         .jacobian("FL_foot", eom.contacts.positions(state)[0])[0]
     )
-    assert np.allclose(
-        state.M @ qdd + state.h - eom.S @ tau, J_foot.T @ forces[:3] + A.T @ forces[3:], atol=1e-7
-    )
+    expected = J_foot.T @ forces[:3] + A.T @ forces[3:]
+    assert np.allclose(state.M @ qdd + state.h - eom.S @ tau, expected, atol=1e-7)
     assert eom.contacts.point_names == ("FL_foot",)
 
 
-def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
+def test_rows_that_turn_with_time_push_along_where_they_point_now():
     """Note 6: in A(q, q̇, t) q̈ = b(q, q̇, t), the constraint force at t is A(t)ᵀ λ, not A(0)ᵀ λ."""
     state = judges.load("go2").random_state(0)
 
@@ -161,7 +158,7 @@ def test_rows_that_turn_with_time_push_along_where_they_point_now() -> None:
     assert np.allclose(eom.J, expected), "J of (4) was taken at another time than A of (5)"
 
 
-def test_a_number_of_rows_may_be_a_float() -> None:
+def test_a_number_of_rows_may_be_a_float():
     whole = LinearConstraint("one", 1.0, lambda s, t: (np.ones((1, 18)), np.zeros(1)))
     assert fb.Contacts([whole]).k == 1 and whole.row_names == ("row 0",)
 
@@ -169,7 +166,7 @@ def test_a_number_of_rows_may_be_a_float() -> None:
 # bolts: Figure 1, left ----------------------------------------------------------------------------
 
 
-def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_of_mass() -> None:
+def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_of_mass():
     """λ acts on the robot: + m g along z, and r × (+ m g z) about the frame.
 
     Here r points from the frame to the centre of mass.
@@ -185,7 +182,7 @@ def test_bolts_of_a_robot_at_rest_carry_its_weight_and_the_moment_of_its_centre_
     assert np.allclose(zeta(tau), np.concatenate([up, np.cross(lever, up)]), atol=1e-8)
 
 
-def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls() -> None:
+def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls():
     """Without torque λ = m (a_com - g), which is less than the weight because the legs fall."""
     state = judges.load("go2").standing()
     qdd, wrench = motion(state, fixed_frame("base"))
@@ -197,7 +194,7 @@ def test_bolts_of_a_robot_whose_legs_swing_free_carry_the_weight_less_what_falls
     assert 0.5 * up[2] < wrench[2] < 0.99 * up[2]
 
 
-def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_base_wrench() -> None:
+def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_base_wrench():
     robot = judges.load("go2")
     rng = np.random.default_rng(0)
     model = pin.buildModelFromXML(robot.urdf)
@@ -231,7 +228,7 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_ba
         assert np.allclose(R.T @ wrench[3:], origin.angular, atol=1e-7)
 
 
-def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() -> None:
+def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1():
     """Section 1: a fixed base is fully actuated. η reaches all joint accelerations when the robot
     is fixed, but not when it stands.
     """
@@ -242,7 +239,7 @@ def test_with_bolts_any_joint_acceleration_has_its_torques_as_in_equation_1() ->
     assert np.linalg.matrix_rank(dynamics.accelerations_from_torques(standing).A[6:], tol=1e-6) == 6
 
 
-def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
+def test_a_driven_frame_has_the_desired_acceleration_at_that_time():
     def desired(t: float) -> Array:
         return np.array([np.sin(t), 2.0 * np.cos(3.0 * t), -t])
 
@@ -258,7 +255,7 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time() -> None:
 # the wheel ----------------------------------------------------------------------------------------
 
 
-def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Robot) -> None:
+def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart):
     """Eq. (6) by central differences of J(q) v with fixed v, at random states on slopes."""
     rng = np.random.default_rng(0)
     for seed in range(20):
@@ -273,7 +270,7 @@ def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart: Rob
         assert np.array_equal(A, wheel.jacobian(state))
 
 
-def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(cart: Robot) -> None:
+def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(cart):
     rng = np.random.default_rng(1)
     for seed in range(10):
         q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
@@ -285,7 +282,7 @@ def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(ca
         assert np.allclose(wheel.slip(state), velocity, atol=1e-8)
 
 
-def test_the_contact_is_the_lowest_point_of_the_rim(cart: Robot) -> None:
+def test_the_contact_is_the_lowest_point_of_the_rim(cart):
     rng = np.random.default_rng(2)
     angles = np.linspace(0.0, 2.0 * np.pi, 20001)
     for seed in range(5):
@@ -301,9 +298,7 @@ def test_the_contact_is_the_lowest_point_of_the_rim(cart: Robot) -> None:
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.4, 0.9])
-def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(
-    disc: Robot, slope: float
-) -> None:
+def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(disc, slope):
     normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
     down = np.array([np.cos(slope), 0.0, -np.sin(slope)])
     state = pose(disc, np.eye(3), R_DISC * normal, np.zeros(3), np.zeros(3))
@@ -312,15 +307,12 @@ def test_a_solid_disc_rolls_down_a_slope_with_two_thirds_of_g_sin_theta(
     assert np.allclose(linear, 2.0 / 3.0 * G * np.sin(slope) * down, atol=1e-10)
     assert np.allclose(angular, [0.0, 2.0 / 3.0 * G * np.sin(slope) / R_DISC, 0.0], atol=1e-9)
     # friction acts up the slope with the remaining third
-    assert np.allclose(
-        force, M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down), atol=1e-9
-    )
+    expected = M_DISC * G * (np.cos(slope) * normal - np.sin(slope) / 3.0 * down)
+    assert np.allclose(force, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("lean", "radius"), [(1.2, 0.6), (0.8, 1.0), (0.5, 0.3)])
-def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
-    disc: Robot, lean: float, radius: float
-) -> None:
+def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(disc, lean, radius):
     """Steady rolling at angle α between disc and ground, with the centre on a circle of radius b.
 
     The rate is Ω² = 4 g cot α / (6 b + r cos α).
@@ -343,16 +335,15 @@ def test_a_leaning_coin_rolls_in_a_circle_at_the_rate_of_the_closed_form(
     assert np.allclose(linear, -(rate**2) * radius * out, atol=1e-9)
     assert np.allclose(angular, rate * np.cross(Z, omega), atol=1e-9)
     assert np.allclose(force, M_DISC * (G * Z - rate**2 * radius * out), atol=1e-9)
-    faster = state.replace(
-        v=1.2 * state.v
-    )  # at another rate the lean changes, and the path is not a circle
+    # at another rate the lean changes, and the path is not a circle
+    faster = state.replace(v=1.2 * state.v)
     assert (
         np.linalg.norm(world_acceleration(faster, motion(faster, wheel)[0])[1] - 1.44 * angular)
         > 1.0
     )
 
 
-def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) -> None:
+def test_parallel_parking_no_position_constraint_could_forbid_slip(disc):
     """Roll, turn, roll back, turn back: without any slip the disc ends beside its first position.
 
     The disc cannot go there directly. Whether it can reach this place depends on the path, which no
@@ -382,16 +373,13 @@ def test_parallel_parking_no_position_constraint_could_forbid_slip(disc: Robot) 
     end = drive(back, lambda axle: -turn * Z)
     assert np.allclose(ahead.q[:3] - start.q[:3], [way, 0.0, 0.0], atol=1e-9)
     assert np.allclose(end.frame_pose("disc").rotation, np.eye(3), atol=1e-9)
-    assert np.allclose(
-        end.q[:3] - start.q[:3], way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0]), atol=1e-9
-    )
+    expected = way * np.array([1 - np.cos(turn), -np.sin(turn), 0.0])
+    assert np.allclose(end.q[:3] - start.q[:3], expected, atol=1e-9)
     sideways = start.replace(v=[0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
     assert np.linalg.norm(wheel.slip(sideways)) > 0.9
 
 
-def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(
-    cart: Robot,
-) -> None:
+def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_ground_cannot(cart):
     """The height of the centre, r √(1 - (n·a)²), is a position constraint with the normal row as
     its derivative. The curl of the tangential rows is not zero on the allowed motions (Frobenius),
     so they are not the derivative of any position constraint.
@@ -433,14 +421,14 @@ def test_the_wheels_row_along_the_normal_can_be_integrated_and_the_two_in_the_gr
     assert bracket(PointContact("wheel")) < 1e-6 and bracket(wheel) > 0.05
 
 
-def test_a_wheel_that_lies_flat_has_no_lowest_point(disc: Robot) -> None:
+def test_a_wheel_that_lies_flat_has_no_lowest_point(disc):
     state = pose(
         disc, judges.rotation([np.pi / 2, 0.0, 0.0]), np.zeros(3), np.zeros(3), np.zeros(3)
     )
     refused(lambda: wheel_of_the_disc().constraint(state), InputError, "disc")
 
 
-def test_a_wheel_and_feet_and_bolts_stand_in_one_list_under_their_names(cart: Robot) -> None:
+def test_a_wheel_and_feet_and_bolts_stand_in_one_list_under_their_names(cart):
     contacts = fb.Contacts([RollingWheel("wheel", [0, 1, 0], 0.17), fixed_frame("body")])
     assert contacts.names == ("wheel", "bolts of body")
     assert contacts.force_slice("bolts of body") == slice(3, 9)

@@ -57,21 +57,19 @@ class Pad:
         return self.jacobian(state), -state.frame_drift(self.name)[:3]
 
 
-def test_contacts_of_a_users_own_are_chosen_by_name() -> None:
+def test_user_defined_contacts_are_selected_by_name():
     contacts = fb.Contacts(
         [Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))]
     )
     assert contacts.force_slice("FR_foot") == slice(3, 6)
     assert contacts.only("FR_foot").names == contacts.without("FL_foot").names == ("FR_foot",)
     state = judges.load("go2").standing()
-    eom, feet = (
-        fb.equations_of_motion(state, contacts),
-        [PointContact(name) for name in contacts.names],
-    )
+    eom = fb.equations_of_motion(state, contacts)
+    feet = [PointContact(name) for name in contacts.names]
     assert np.allclose(eom.J, fb.equations_of_motion(state, fb.Contacts(feet)).J, atol=1e-12)
 
 
-def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str) -> None:
+def test_contact_points_are_where_the_physics_has_them_for_any_normal(name):
     robot = judges.load(name)
     for seed, state in enumerate(judges.states(name, 3)):
         normal = (
@@ -79,9 +77,8 @@ def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str)
         )
         sim = fb.Simulation(robot, Ground(normal=normal))
         if name in judges.FLAT:
-            state = (
-                robot.standing()
-            )  # corners are balls' lowest points, so only level soles can be compared
+            # corners are balls' lowest points, so only level soles can be compared
+            state = robot.standing()
         sim.reset(state)
         make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
         contacts = make(robot, normals=normal)
@@ -89,7 +86,7 @@ def test_contact_points_are_where_the_physics_has_them_for_any_normal(name: str)
         assert np.allclose(contacts.positions(state), sim.contact_positions(), atol=1e-9)
 
 
-def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name: str) -> None:
+def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name):
     judge = judges.mujoco_of(name)
     for seed, state in enumerate(judges.states(name, N)):
         contacts = tilted(name, seed)
@@ -99,7 +96,7 @@ def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name: str) -> None
         assert np.allclose(contacts.jacobian(state), expected, atol=1e-9)
 
 
-def test_b_is_minus_the_change_of_a_v_along_v(name: str) -> None:
+def test_b_is_minus_the_change_of_a_v_along_v(name):
     for seed, state in enumerate(judges.states(name, N, spread=0.6)):
         contacts = tilted(name, seed)
         expected = -judges.drift_of(lambda s, c=contacts: c.constraint(s)[0], state)
@@ -107,7 +104,7 @@ def test_b_is_minus_the_change_of_a_v_along_v(name: str) -> None:
         assert np.allclose(contacts.constraint(state)[1], expected, atol=1e-6)
 
 
-def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
+def test_a_ball_rolls_without_slipping_over_its_lowest_point():
     """A ball that satisfies its contact rows moves its centre by ω × (r n), as in pure rolling."""
     robot = judges.load("go2")
     n = judges.random_normals(1, 4)[0]
@@ -122,7 +119,7 @@ def test_a_ball_rolls_without_slipping_over_its_lowest_point() -> None:
 
 
 @pytest.mark.parametrize("name", judges.FLAT)
-def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
+def test_corner_forces_make_the_wrench_of_their_generators(name):
     rng = np.random.default_rng(0)
     for state in judges.states(name, N):
         for contact in judges.stance(state.robot):
@@ -139,7 +136,7 @@ def test_corner_forces_make_the_wrench_of_their_generators(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", judges.FLAT)
-def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None:
+def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name):
     for state in judges.states(name, N):
         for contact in judges.stance(state.robot):
             assert isinstance(contact, FlatFootContact)
@@ -153,7 +150,7 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name: str) -> None
 
 
 @pytest.mark.parametrize("name", judges.FLAT)
-def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name: str) -> None:
+def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name):
     """A flat foot needs 6 rows: at the corners, J q̈ = -J̇ q̇ has no solution if the foot turns."""
     state = judges.load(name).random_state(0, spread=1.0)
     contact = next(iter(judges.stance(state.robot)))
@@ -166,7 +163,7 @@ def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name: str) -
 # names, choices, order ----------------------------------------------------------------------------
 
 
-def test_all_feet_touch_by_default_in_the_robots_order(name: str) -> None:
+def test_all_feet_touch_by_default_in_the_robots_order(name):
     robot = judges.load(name)
     contacts = judges.stance(robot)
     assert contacts.names == tuple(foot.frame for foot in robot.feet)
@@ -174,7 +171,7 @@ def test_all_feet_touch_by_default_in_the_robots_order(name: str) -> None:
     assert contacts.k == 3 * contacts.n_points == len(contacts.jacobian(robot.standing()))
 
 
-def test_each_contact_has_its_own_slice_of_forces_and_rows(name: str) -> None:
+def test_each_contact_has_its_own_slice_of_forces_and_rows(name):
     state = judges.load(name).random_state(0)
     contacts = judges.stance(state.robot)
     J, stop = contacts.jacobian(state), 0
@@ -186,7 +183,7 @@ def test_each_contact_has_its_own_slice_of_forces_and_rows(name: str) -> None:
     assert stop == contacts.k
 
 
-def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind() -> None:
+def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind():
     contacts = fb.Contacts.points(judges.load("go2"))
     a, b, c, d = contacts.names
     assert contacts.only(c, a).names == (a, c) and contacts.without(b).names == (a, c, d)
@@ -197,7 +194,7 @@ def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind() -> None
     assert "FR_foot" in repr(contacts)
 
 
-def test_normals_can_be_one_for_all_one_for_each_or_by_name() -> None:
+def test_normals_can_be_one_for_all_one_for_each_or_by_name():
     robot = judges.load("go2")
     names = fb.Contacts.points(robot).names
     lean = judges.random_normals(4, 0)
@@ -209,7 +206,7 @@ def test_normals_can_be_one_for_all_one_for_each_or_by_name() -> None:
     assert np.allclose(by_name.normals, [[0, 0, 1], [0, 0, 1], lean[2], [0, 0, 1]])
 
 
-def test_friction_is_that_of_each_contact_at_each_of_its_points() -> None:
+def test_friction_is_that_of_each_contact_at_each_of_its_points():
     talos = judges.load("talos")
     left, right = (foot.frame for foot in talos.feet)
     mixed = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left]) + fb.Contacts.points(
@@ -220,7 +217,7 @@ def test_friction_is_that_of_each_contact_at_each_of_its_points() -> None:
     assert mixed.k == 15
 
 
-def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners() -> None:
+def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners():
     talos = judges.load("talos")
     state = talos.random_state(0)
     points = fb.Contacts.points(talos).positions(state)
@@ -228,7 +225,7 @@ def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners() -> 
     assert np.allclose(points, corners.mean(axis=1), atol=1e-12)
 
 
-def test_a_frame_that_is_no_foot_can_touch_at_its_origin() -> None:
+def test_a_frame_that_is_no_foot_can_touch_at_its_origin():
     robot = judges.load("anymal_kinova")
     hand = robot.frames[-1]
     state = robot.random_state(0)
@@ -236,7 +233,7 @@ def test_a_frame_that_is_no_foot_can_touch_at_its_origin() -> None:
     assert np.allclose(contacts.positions(state), [state.point(hand)])
 
 
-def test_no_contacts_give_empty_rows() -> None:
+def test_no_contacts_give_empty_rows():
     state = judges.load("go2").random_state(0)
     none = fb.Contacts([])
     assert none.jacobian(state).shape == (0, 18) and none.constraint(state)[0].shape == (0, 18)
@@ -245,7 +242,7 @@ def test_no_contacts_give_empty_rows() -> None:
     assert none.k == none.n_points == len(none) == len(fb.Contacts.none()) == 0
 
 
-def test_each_foot_may_have_its_own_friction() -> None:
+def test_each_foot_may_have_its_own_friction():
     robot, mu = judges.load("go2"), (0.3, 0.4, 0.5, 0.6)
     assert np.array_equal(fb.Contacts.points(robot, mu=mu).mus, [0.3, 0.4, 0.5, 0.6])
     assert np.array_equal(
@@ -259,7 +256,7 @@ def test_each_foot_may_have_its_own_friction() -> None:
     assert np.array_equal(fb.Contacts.flat_feet(talos, mu=mu[:2]).mus, [0.3] * 4 + [0.4] * 4)
 
 
-def test_the_force_of_a_contact_is_its_own_part_of_lambda_or_the_resultant_of_its_corners() -> None:
+def test_the_force_of_a_contact_is_its_own_part_of_lambda_or_the_resultant_of_its_corners():
     rng = np.random.default_rng(0)
     for name in judges.FLOATING:
         contacts = judges.stance(judges.load(name))
@@ -272,7 +269,7 @@ def test_the_force_of_a_contact_is_its_own_part_of_lambda_or_the_resultant_of_it
             assert np.array_equal(each[1], forces[:, 3:6])
 
 
-def test_feet_are_taken_as_they_are_flat_or_round() -> None:
+def test_feet_are_taken_as_they_are_flat_or_round():
     for name in judges.ROBOTS:
         robot = judges.load(name)
         contacts = fb.Contacts.feet(robot, mu=0.4)
@@ -291,7 +288,7 @@ def test_feet_are_taken_as_they_are_flat_or_round() -> None:
     assert np.array_equal(mixed.mus, [0.3] * 4 + [0.7] * 4)
 
 
-def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts() -> None:
+def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts():
     robot = judges.load("go2")
     legs = fb.load_urdf(robot.urdf, posture=robot.posture)
     refused(lambda: fb.Contacts.feet(legs), InputError, "Contacts.points", "feet")
@@ -299,24 +296,21 @@ def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts()
     assert len(fb.Contacts.feet(judges.load("ur5"))) == 0
 
 
-def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows() -> None:
+def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows():
     robot = judges.load("go2")
     state = robot.standing()
     sole = fb.Contacts.points(robot).positions(state)[0]
-    assert np.allclose(
-        state.point("FL_foot") - sole, [0.0, 0.0, robot.foot("FL_foot").radius], atol=1e-12
-    )
+    expected = [0.0, 0.0, robot.foot("FL_foot").radius]
+    assert np.allclose(state.point("FL_foot") - sole, expected, atol=1e-12)
     here = fb.FrameTask("FL_foot", state.point("FL_foot"))
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    assert np.allclose(
-        here.residual(eom).b, state.frame_drift("FL_foot")[:3]
-    )  # no error to correct
-    assert (
-        np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
-    )  # kp times the radius, m/s²
+    # no error to correct
+    assert np.allclose(here.residual(eom).b, state.frame_drift("FL_foot")[:3])
+    # kp times the radius, m/s²
+    assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
 
 
-def test_a_constraint_of_a_users_own_needs_no_friction_and_half_of_it_is_refused() -> None:
+def test_a_user_defined_constraint_needs_no_friction_and_an_incomplete_one_is_refused():
     class Rail:
         name, k, row_names = "rail", 1, ("across",)
 

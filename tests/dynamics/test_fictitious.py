@@ -11,11 +11,7 @@ import numpy as np
 import scipy.integrate
 
 import floatbase as fb
-from floatbase.dynamics import (
-    bias_forces,
-    coriolis_matrix,
-    view_from_rotating_frame,
-)
+from floatbase.dynamics import bias_forces, coriolis_matrix, view_from_rotating_frame
 
 N = 5
 
@@ -23,23 +19,21 @@ N = 5
 name = judges.every_robot
 
 
-def test_the_parts_sum_to_h(name: str) -> None:
+def test_the_parts_sum_to_h(name):
     for state in judges.states(name, N, spread=1.0):
         parts = bias_forces(state)
         assert judges.relative(parts.total, state.h) < 1e-12
         assert np.array_equal(parts.fictitious, parts.centrifugal + parts.coriolis)
 
 
-def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name: str) -> None:
+def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name):
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.gravity[:] = 0.0
     for state in judges.states(name, N, spread=1.0):
         assert judges.relative(bias_forces(state).fictitious, judge.move_to(state).h) < 1e-8
 
 
-def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(
-    name: str,
-) -> None:
+def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(name):
     """In MuJoCo, the linear velocity of a free joint is in world axes, and the angular velocity in
     the axes of the base.
     """
@@ -54,26 +48,21 @@ def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_
         assert judges.relative(bias_forces(state, axes="world").fictitious, to_raw.T @ raw) < 1e-8
 
 
-def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(
-    name: str,
-) -> None:
+def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(name):
     """World acceleration of the base if h alone acts: M q̈ = -h in base axes, Tᵀ M T u̇ = -h in
     world axes.
     """
     for state in judges.states(name, N, spread=1.0):
         own, world = bias_forces(state), bias_forces(state, axes="world")
         if not state.robot.is_floating:
-            assert np.array_equal(own.total, world.total) and np.array_equal(
-                own.coriolis, world.coriolis
-            )
+            assert np.array_equal(own.total, world.total)
+            assert np.array_equal(own.coriolis, world.coriolis)
             continue
         R, nv = state.frame_pose("base").rotation, state.robot.nv
         T = np.eye(nv)
         T[:3, :3] = T[3:6, 3:6] = R.T
-        qdd, u_dot = (
-            np.linalg.solve(state.M, -own.total),
-            np.linalg.solve(T.T @ state.M @ T, -world.total),
-        )
+        qdd = np.linalg.solve(state.M, -own.total)
+        u_dot = np.linalg.solve(T.T @ state.M @ T, -world.total)
         turning = np.cross(state.v[3:6], state.v[:3])
         assert (
             judges.relative(u_dot, np.concatenate([R @ (qdd[:3] + turning), R @ qdd[3:6], qdd[6:]]))
@@ -82,7 +71,7 @@ def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bo
         assert np.allclose(world.gravity, T.T @ own.gravity)
 
 
-def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axes() -> None:
+def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axes():
     """The force on a gliding base is an artefact of its axes: base axes add m ω × v, while world
     axes leave only the effect of tumbling.
     """
@@ -99,7 +88,7 @@ def test_gliding_and_tumbling_as_one_body_needs_no_force_on_the_com_in_world_axe
     assert np.allclose(world[:3], R @ tumbling, atol=1e-9)
 
 
-def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None:
+def test_gravity_is_the_slope_of_the_weights_potential_energy(name):
     """MuJoCo computes the potential energy."""
     judge = judges.Mujoco(judges.load(name))
     judge.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
@@ -113,9 +102,7 @@ def test_gravity_is_the_slope_of_the_weights_potential_energy(name: str) -> None
         assert judges.relative(bias_forces(state).gravity, slope) < 1e-5
 
 
-def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grows_with_the_square(
-    name: str,
-) -> None:
+def test_one_moving_coordinate_has_no_coriolis_force_and_a_quadratic_centrifugal_force(name):
     state = judges.load(name).random_state(3, spread=1.0)
     scale = np.max(np.abs(state.h))
     for i, unit in enumerate(np.eye(state.robot.nv)):
@@ -124,7 +111,7 @@ def test_one_coordinate_alone_feels_no_coriolis_force_and_centrifugal_force_grow
         assert np.allclose(fast.centrifugal, 9.0 * slow.centrifugal, atol=1e-11 * scale)
 
 
-def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str) -> None:
+def test_coriolis_forces_are_the_products_of_two_different_velocities(name):
     """Sum over i < j of the forces that need both velocities, by MuJoCo without gravity."""
     state = judges.load(name).random_state(4, spread=1.0)
     judge = judges.Mujoco(state.robot)
@@ -144,21 +131,21 @@ def test_coriolis_forces_are_the_products_of_two_different_velocities(name: str)
     assert judges.relative(bias_forces(state).centrifugal, sum(alone)) < 1e-8
 
 
-def test_the_coriolis_matrix_gives_the_velocity_forces(name: str) -> None:
+def test_the_coriolis_matrix_gives_the_velocity_forces(name):
     for state in judges.states(name, N, spread=1.0):
         assert (
             judges.relative(coriolis_matrix(state) @ state.v, bias_forces(state).fictitious) < 1e-9
         )
 
 
-def test_inertia_changes_as_finite_differences_along_v_say(name: str) -> None:
+def test_inertia_changes_as_finite_differences_along_v_say(name):
     for state in judges.states(name, N, spread=1.0):
         differences = judges.derivative(lambda s: s.M, state, state.v, 1e-5)
         C = coriolis_matrix(state)
         assert judges.relative(C + C.T, differences) < 1e-6
 
 
-def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name: str) -> None:
+def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name):
     """vᵀ (Ṁ - 2 C) v = 0 with Ṁ from differences of M.
 
     It does not hold for the C of half the velocity, or for C without one column.
@@ -176,7 +163,7 @@ def test_fictitious_forces_do_no_net_work_and_those_of_a_wrong_matrix_would(name
     assert np.all(worst[1:] > 1e-3)
 
 
-def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy() -> None:
+def test_a_robot_thrown_without_gravity_keeps_its_kinetic_energy():
     """go2 moves its legs for 0.2 s under fictitious forces alone.
 
     Energy moves between joints and base, but the total is constant.
@@ -211,7 +198,7 @@ def wandering_rate(t: float) -> np.ndarray:
     return np.array([2.0 * np.cos(2.0 * t), 0.5, -3.0 * np.sin(3.0 * t)])
 
 
-def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> None:
+def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does():
     time = np.linspace(0.0, 2.0, 4001)
     view = view_from_rotating_frame(
         time, wandering, (0.4, -0.2, 0.7), (0.3, 0.5, -0.1), wandering_rate
@@ -229,7 +216,7 @@ def test_the_three_terms_explain_the_curved_path_whatever_the_frame_does() -> No
         assert np.max(np.abs(term)) > 0.5
 
 
-def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
+def test_the_frames_rotation_agrees_with_a_tight_integrator():
     def derivative(t: float, R: np.ndarray) -> np.ndarray:
         x, y, z = wandering(t)
         return (np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ R.reshape(3, 3)).ravel()
@@ -245,7 +232,7 @@ def test_the_frames_rotation_agrees_with_a_tight_integrator() -> None:
     assert np.allclose(found @ found.transpose(0, 2, 1), np.eye(3), atol=1e-12)
 
 
-def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns_evenly() -> None:
+def test_a_particle_at_rest_in_the_world_circles_backwards_in_a_frame_that_turns_evenly():
     """p' = (r cos ωt, -r sin ωt): the inward Coriolis acceleration is twice the outward centrifugal
     acceleration.
     """

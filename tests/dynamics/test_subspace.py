@@ -137,7 +137,7 @@ def held_cases(name: str) -> list[tuple[str, EquationsOfMotion]]:
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name: str) -> None:
+def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name):
     for case, eom in cases(name):
         found = dynamics.dimensions(eom)
         _, J = judged(eom)
@@ -147,7 +147,7 @@ def test_ranks_of_the_contact_jacobian_are_those_of_mujocos_by_elimination(name:
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: str) -> None:
+def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name):
     for case, eom in cases(name):
         found, (_, J) = dynamics.dimensions(eom), judged(eom)
         expected = eom.d + eom.k - eliminated(J)
@@ -162,7 +162,7 @@ def test_null_spaces_of_B_and_C_both_have_dimension_d_plus_k_minus_rank_J(name: 
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(name: str) -> None:
+def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(name):
     """rank V_q̈ = d - rank J + rank J_b is the number of accelerations that torques can produce
     while the contacts hold.
     """
@@ -176,9 +176,7 @@ def test_as_many_accelerations_are_free_as_torques_reach_by_mujocos_matrices(nam
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(
-    name: str,
-) -> None:
+def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_geometry_says(name):
     """k - rank J_b from geometry alone: one point, points on a line, and other points have 3, 5 or
     6 independent wrenches on a rigid body.
     """
@@ -197,7 +195,7 @@ def test_internal_forces_are_those_that_push_the_rigid_body_nowhere_as_many_as_g
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -> None:
+def test_torques_squeeze_internal_forces_in_without_moving_anything(name):
     """If τ changes by -J_jᵀ λ for an internal λ, the acceleration by Pinocchio's recursion is the
     same.
     """
@@ -218,7 +216,7 @@ def test_torques_squeeze_internal_forces_in_without_moving_anything(name: str) -
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -> None:
+def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name):
     for case, eom in cases(name):
         _, J = judged(eom)
         N = dynamics.undetermined_forces(eom)
@@ -228,7 +226,7 @@ def test_forces_are_unique_exactly_where_null_J_transposed_is_empty(name: str) -
             assert np.max(np.abs(J.T @ N), initial=0.0) < 1e-8, case
 
 
-def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_elsewhere() -> None:
+def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_elsewhere():
     robot = judges.load("solo8")
     for state, rank in (
         (robot.standing(), 10),
@@ -240,7 +238,7 @@ def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_els
         assert found.rank_V_qdd == 8 - rank + found.rank_J_base
 
 
-def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_rank() -> None:
+def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_rank():
     """The base can move, so 12 contact rows stay independent, although the 3 × 3 Jacobian of each
     leg is singular.
     """
@@ -253,16 +251,15 @@ def test_straight_knees_alone_do_not_cost_a_robot_with_three_joints_a_leg_its_ra
     assert linear_algebra.rank(eom.J) == eliminated(J) == 12
 
 
-def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_there_too() -> None:
+def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_there_too():
     robot = judges.load("go2")
     contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
     for state, lost in ((robot.standing(), 0), (robot.neutral(), 4)):
         found = dynamics.dimensions(fb.equations_of_motion(state, contacts))
         assert found.rank_J == 18 - lost
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
-        assert (
-            found.rank_V_qdd == 12 - found.rank_J + 6 == lost
-        )  # independent motions of the legs; none if they are bent
+        # independent motions of the legs; none if they are bent
+        assert found.rank_V_qdd == 12 - found.rank_J + 6 == lost
 
 
 def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
@@ -278,7 +275,7 @@ def near_singular(exponent: int, speed: float = 0.0) -> EquationsOfMotion:
     )
 
 
-def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_rank() -> None:
+def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_rank():
     """A simulated solo8 is never exactly symmetric. All numbers must be consistent with the rank
     that J is assigned.
     """
@@ -289,9 +286,7 @@ def test_dimensions_agree_with_each_other_however_near_the_robot_is_to_losing_ra
         assert found.rank_V_qdd == found.d - found.rank_J + found.rank_J_base, exponent
 
 
-def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth() -> (
-    None
-):
+def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_ten_thousandth():
     """A q̈ = b holds to 1e-10 of |q̈| along the resolved directions, and along the others to their
     singular value times |q̈|.
     """
@@ -306,7 +301,7 @@ def test_contacts_hold_under_eta_but_for_directions_they_resolve_worse_than_a_te
         assert held.sum() == (11 if exponent == 1 else 10) or 1 < exponent < 5, exponent
 
 
-def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
+def test_velocity_noise_makes_no_force_near_a_loss_of_rank():
     """The torques that keep solo8 at rest in the singular stance produce the same forces nearby, to
     1 % of the weight.
 
@@ -329,12 +324,11 @@ def test_velocity_noise_makes_no_force_near_a_loss_of_rank() -> None:
             case
         )
         space = dynamics.feasible_space(eom)
-        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, (
-            case
-        )  # the point of smallest norm, which includes q̈ in rad/s²
+        # the point of smallest norm, which includes q̈ in rad/s²
+        assert np.max(np.abs(space.map.b)) < 10.0 * robot.weight, case
 
 
-def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank() -> None:
+def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_losing_rank():
     """It also holds for forces along poorly resolved directions, which have a small effect on q̈."""
     for exponent in range(1, 13):
         eom = near_singular(exponent, 0.1)
@@ -346,7 +340,7 @@ def test_newtons_law_holds_in_the_feasible_space_however_near_the_robot_is_to_lo
         assert space.dimension == eom.d + eom.k - dynamics.dimensions(eom).rank_J, exponent
 
 
-def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_forbid_it() -> None:
+def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_predicts():
     """An inclination of 1e-4 rad is below the resolution of the contacts, so torques that roll the
     base do not meet a reaction of 500 N.
     """
@@ -359,9 +353,8 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     eom = fb.equations_of_motion(sim.state, contacts)
     _, s, Vt = np.linalg.svd(eom.A)
     assert 1e-6 < s[10] / s[0] < dynamics.CONSTRAINT_RANK_TOLERANCE
-    rolling = (
-        0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
-    )  # N·m, torques along the poorly resolved direction
+    # N·m, torques along the poorly resolved direction
+    rolling = 0.05 * Vt[10, 6:] / np.abs(Vt[10, 6:]).max()
     change, rolls = [], []
     motors = [sim.model.joint(joint).dofadr[0] for joint in robot.joint_names]
     sim.data.ctrl[:] = 0.0
@@ -376,14 +369,13 @@ def test_near_a_loss_of_rank_mujoco_rolls_solo8_as_eta_says_although_the_rows_fo
     assert dynamics.accelerations_from_torques(eom).A[3] @ rolling == pytest.approx(roll, rel=0.05)
     found = (dynamics.forces_from_torques(eom).A @ rolling).reshape(4, 3)
     assert np.max(np.abs(found.sum(axis=0) - forces)) < 0.05 * np.max(np.abs(forces))
-    assert (
-        np.max(np.abs(found - (change[1] - change[0]))) < 0.3
-    )  # N; the softness of the contacts decides the lateral forces
+    # N; the softness of the contacts decides the lateral forces
+    assert np.max(np.abs(found - (change[1] - change[0]))) < 0.3
     to_the_letter = np.linalg.pinv(eom.A @ np.linalg.solve(eom.M, eom.J.T), rcond=1e-12) @ eom.A
     assert np.max(np.abs(to_the_letter @ np.linalg.solve(eom.M, eom.S @ rolling))) > 100.0
 
 
-def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_to_it() -> None:
+def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_to_it():
     eom = near_singular(6, 0.1)
     U, _, Vt = np.linalg.svd(eom.A)
     A, b = dynamics.resolved_constraint(eom)
@@ -399,7 +391,7 @@ def test_the_drift_that_counts_is_b_without_what_badly_resolved_directions_add_t
         assert np.allclose(found, given, atol=1e-12)
 
 
-def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
+def test_contacts_whose_forces_act_where_nothing_is_held_are_refused():
     """A thruster is not a contact: its rows must constrain the direction of its force."""
 
     class Thruster(PointContact):
@@ -417,9 +409,7 @@ def test_contacts_whose_forces_act_where_nothing_is_held_are_refused() -> None:
 
 
 @pytest.mark.parametrize(("name", "unseen"), [("go2", 0), ("solo12", 0), ("solo8", 2)])
-def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(
-    name: str, unseen: int
-) -> None:
+def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(name, unseen):
     """For an internal λ, the change -J_jᵀ λ of the torques changes ζ(τ) by λ without its part in
     null(Jᵀ). This leaves k - rank J_b - (k - rank J) directions.
     """
@@ -439,7 +429,7 @@ def test_torques_choose_internal_forces_but_for_those_in_null_J_transposed(
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name: str) -> None:
+def test_in_free_flight_all_torques_are_free_and_no_force_is_left(name):
     state = judges.load(name).random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     found = dynamics.dimensions(eom)
@@ -477,10 +467,8 @@ def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tup
         )
         assert model.m_baumgarte_parameters.Kp == model.m_baumgarte_parameters.Kd == 0.0
         models.append(model)
-    datas, data = (
-        pin.StdVec_RigidConstraintData([m.createData() for m in models]),
-        robot.model.createData(),
-    )
+    datas = pin.StdVec_RigidConstraintData([m.createData() for m in models])
+    data = robot.model.createData()
     pin.initConstraintDynamics(robot.model, data, models, datas)
     settings = pin.ProximalSettings(1e-14, 1e-12, 200)
     qdd = pin.constraintDynamics(
@@ -490,7 +478,7 @@ def pinocchios(eom: EquationsOfMotion, tau: Array, kind: pin.ContactType) -> tup
     return np.array(qdd), np.concatenate([getattr(d.contact_force, part) for d in datas])
 
 
-def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned() -> None:
+def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_aligned():
     """Check the convention of the reference first: its forces, applied to the links as external
     forces, give its accelerations.
     """
@@ -503,7 +491,7 @@ def test_pinocchios_contact_force_is_what_the_ground_does_to_the_robot_world_ali
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name: str) -> None:
+def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(name):
     """Feet of radius 0 at the centres of the balls, random states and torques, and every stance
     with J of full rank.
     """
@@ -528,7 +516,7 @@ def test_zeta_and_eta_are_pinocchios_constrained_dynamics_for_points_in_motion(n
 
 
 @pytest.mark.parametrize("name", judges.FLAT)
-def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: str) -> None:
+def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name):
     """The twelve corner forces of a foot are not unique, but the six numbers of its wrench are,
     also in motion.
     """
@@ -551,7 +539,7 @@ def test_corner_forces_under_flat_feet_make_pinocchios_contact_wrenches(name: st
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str) -> None:
+def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name):
     """Every configuration and stance, with and without loss of rank, against one least-squares
     solution of the whole system.
     """
@@ -568,23 +556,22 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name: str
         ), case
 
 
-def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground() -> None:
+def test_torques_on_the_robot_meet_the_opposite_force_on_the_ground():
     """Section 2.2.1: a leg that presses its foot down is pushed up. Torques with an effect along -z
     at the foot increase λ_z.
     """
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    pressing = eom.J[:, 6:].T @ np.tile(
-        [0.0, 0.0, -10.0], 4
-    )  # joint torques of a downward force of the feet
+    # joint torques of a downward force of the feet
+    pressing = eom.J[:, 6:].T @ np.tile([0.0, 0.0, -10.0], 4)
     change = dynamics.forces_from_torques(eom).A @ pressing
     assert np.all(change[2::3] > 1.0)
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
 def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth_of_the_weight(
-    name: str,
-) -> None:
+    name,
+):
     """The difference is 2e-5 of the weight while swaying at 1 rad/s and 2 cm, so a rigid contact is
     a good model of MuJoCo's stiffest contact.
     """
@@ -611,7 +598,7 @@ def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_a_ten_thousandth
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> None:
+def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name):
     """Eqs. (10) and (12) against eq. (7) at points that do not solve it: the residuals are equal.
     The part of b is computed with MuJoCo's M.
     """
@@ -636,8 +623,8 @@ def test_B_and_C_are_the_equations_of_motion_in_one_matrix_each(name: str) -> No
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
 def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_as_13_has_them(
-    name: str,
-) -> None:
+    name,
+):
     for case, eom in held_cases(name):
         if case.split()[1] not in ("standing", "random"):
             continue
@@ -659,7 +646,7 @@ def test_the_feasible_space_is_the_pseudo_inverse_point_and_the_null_space_of_B_
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(name: str) -> None:
+def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(name):
     """Eq. (7) holds to 1e-9 of its largest term in motion that the contacts allow. Pinocchio's
     recursion computes the dynamics.
     """
@@ -677,7 +664,7 @@ def test_every_point_of_the_feasible_space_satisfies_the_equations_of_motion(nam
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
+def test_every_solution_is_a_point_of_the_feasible_space(name):
     """For a random τ, with q̈ and λ from another solver and any part of null(Jᵀ) added, the
     coordinates map back to the same point.
     """
@@ -696,19 +683,18 @@ def test_every_solution_is_a_point_of_the_feasible_space(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", judges.ROBOTS)
-def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name: str) -> None:
+def test_coordinates_of_a_point_of_the_space_are_the_beta_it_came_from(name):
     rng = np.random.default_rng(2)
     for case, eom in cases(name):
         space = dynamics.feasible_space(eom)
         beta = rng.normal(size=space.dimension)
         assert np.allclose(space.coordinates(*space(beta)), beta, atol=1e-8), case
         assert np.allclose(space.map.A.T @ space.map.A, np.eye(space.dimension), atol=1e-10), case
-        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, (
-            case
-        )  # (13) v has no part along V⊥
+        # (13) v has no part along V⊥
+        assert np.max(np.abs(space.map.A.T @ space.map.b)) < 1e-6, case
 
 
-def test_with_inconsistent_contacts_the_dynamics_hold_and_motion_rows_are_met_nearest() -> None:
+def test_with_inconsistent_contacts_the_dynamics_hold_and_motion_rows_are_met_nearest():
     """solo8 with four feet that slide apart: A q̈ = b has no solution, but Newton's law must still
     hold.
     """

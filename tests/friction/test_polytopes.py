@@ -22,7 +22,7 @@ def made_of(rays: Array, x: Array) -> bool:
 
 @settings(max_examples=60)
 @given(seeds, st.integers(1, 6), st.integers(1, 12))
-def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> None:
+def test_rows_hold_for_just_what_the_rays_make(seed, n, N):
     """Any number of rays: too few to span the space, enough, or so many that they span lines.
 
     They may also span the whole space.
@@ -39,13 +39,13 @@ def test_rows_hold_for_just_what_the_rays_make(seed: int, n: int, N: int) -> Non
         assert made_of(rays, x) == bool(np.max(G @ x, initial=0.0) <= 1e-9)
 
 
-def test_every_row_is_a_facet() -> None:
+def test_every_row_is_a_facet():
     rays = np.random.default_rng(0).normal(size=(6, 20)) + 2.5 * np.eye(6)[:, :1]
     for row in cone_face_matrix(rays)[0]:
         assert np.linalg.matrix_rank(rays[:, np.abs(row @ rays) < 1e-9]) == 5
 
 
-def test_a_half_space_has_one_row_and_the_whole_space_none() -> None:
+def test_a_half_space_has_one_row_and_the_whole_space_none():
     lines = np.array(
         [[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]]
     )
@@ -64,9 +64,7 @@ def points_of(rng: np.random.Generator, n: int, rank: int) -> Array:
 
 @settings(max_examples=60)
 @given(seeds, st.integers(2, 3), st.integers(0, 3))
-def test_vertices_are_those_of_the_hull_whatever_its_dimension(
-    seed: int, n: int, rank: int
-) -> None:
+def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed, n, rank):
     rank = min(rank, n)
     points = points_of(np.random.default_rng(seed), n, rank)
     found = polytope_vertices(lambda direction: points[int(np.argmax(points @ direction))], n, 1.0)
@@ -84,7 +82,7 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(
     assert len(found) == len(expected)
 
 
-def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clockwise() -> None:
+def test_points_on_an_edge_are_no_vertices_and_the_plane_is_walked_counter_clockwise():
     square = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 1.0]])
     # the worst answer that is allowed: of the extreme points, the one in the middle of the edge
     middle = np.array([0.0, 1e-12, 0.0, 0.0, 0.0, 1e-12])

@@ -24,7 +24,7 @@ def loads(seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_about_the_centre_of_pressure_there_is_no_tangential_moment(seed: int) -> None:
+def test_about_the_centre_of_pressure_there_is_no_tangential_moment(seed):
     state, forces = TALOS.standing(), loads(seed)
     for contacts, part in ((SOLES, forces), (SOLES.only("left_sole_link"), forces[:4])):
         centre = centre_of_pressure(state, contacts, part)
@@ -38,14 +38,14 @@ def test_about_the_centre_of_pressure_there_is_no_tangential_moment(seed: int) -
         assert (hull.equations[:, :2] @ centre[:2] + hull.equations[:, 2]).max() < 1e-9
 
 
-def test_the_wrench_of_a_sole_is_the_sum_of_its_corners() -> None:
+def test_the_wrench_of_a_sole_is_the_sum_of_its_corners():
     state, forces = TALOS.random_state(3, 0.1), loads(7)[:4]
     sole, about = SOLES.only("left_sole_link"), np.array([0.1, 0.2, 0.3])
     moment = sum(np.cross(x - about, f) for x, f in zip(sole.positions(state), forces, strict=True))
     assert np.allclose(contact_wrench(state, sole, forces, about), [*forces.sum(axis=0), *moment])
 
 
-def test_the_ground_pushes_where_the_controller_planned() -> None:
+def test_the_ground_pushes_where_the_controller_planned():
     state = TALOS.standing()
     target = state.com + [0.02, 0.01, 0.0]
     tasks = [fb.CoMTask(target), *fb.standing_tasks(state)[1:]]
@@ -56,12 +56,11 @@ def test_the_ground_pushes_where_the_controller_planned() -> None:
         centre_of_pressure(run.final, SOLES, forces[-1]) for forces in (run.planned, run.measured)
     )
     assert np.allclose(planned, measured, atol=1e-3)
-    assert np.allclose(
-        measured[:2], run.final.com[:2], atol=2e-3
-    )  # at rest it is below the centre of mass
+    # at rest it is below the centre of mass
+    assert np.allclose(measured[:2], run.final.com[:2], atol=2e-3)
 
 
-def test_without_pressure_there_is_no_centre() -> None:
+def test_without_pressure_there_is_no_centre():
     state = TALOS.standing()
     refused(lambda: centre_of_pressure(state, SOLES, np.zeros(24)), InputError, 0)
     with raises(InputError, "held"):

@@ -115,7 +115,7 @@ class Judge:
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
 @pytest.mark.parametrize(("name", "feet"), STANCES)
-def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: float) -> None:
+def test_membership_and_margin_are_what_cvxpy_finds(name, feet, tilt):
     state, contacts = stance(name, feet, tilt)
     wrenches = wrench_set(state, contacts)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=False)
@@ -133,9 +133,7 @@ def test_membership_and_margin_are_what_cvxpy_finds(name: str, feet: int, tilt: 
 
 
 @pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("talos", 2)])
-def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(
-    name: str, feet: int
-) -> None:
+def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra(name, feet):
     state, contacts = stance(name, feet, 0.5)
     judge = Judge(contacts.positions(state), contacts.normals, 0.6, exact=True)
     inner = wrench_set(state, contacts, facets=6)
@@ -146,7 +144,7 @@ def test_the_exact_cones_wrenches_lie_between_those_of_inner_and_outer_polyhedra
         assert exact < 1e-4 or outer.margin(w) > -1e-4
 
 
-def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
+def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays():
     state, contacts = stance("go2", 3, 0.5)
     wrenches = wrench_set(state, contacts, facets=5)
     G = com_wrench_map(state, contacts).A
@@ -158,7 +156,7 @@ def test_rays_are_what_the_centroidal_maps_make_of_the_friction_rays() -> None:
 
 @pytest.mark.parametrize("facets", [4, 7])
 @pytest.mark.parametrize(("name", "feet"), STANCES)
-def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: int) -> None:
+def test_rows_and_rays_describe_the_same_wrenches(name, feet, facets):
     state, contacts = stance(name, feet, 0.4)
     wrenches = wrench_set(state, contacts, facets=facets)
     rows, E, rays = wrenches.face_matrix, wrenches.equalities, wrenches.rays
@@ -171,22 +169,14 @@ def test_rows_and_rays_describe_the_same_wrenches(name: str, feet: int, facets: 
     inwards = rays.sum(axis=1)
     for _ in range(8):
         cost = -rng.normal(size=6) / scale
-        best = linprog(
-            cost,
-            np.vstack([rows, inwards / scale**2]),
-            np.append(np.zeros(len(rows)), 100.0),
-            E,
-            np.zeros(len(E)),
-            (None, None),
-        )
+        G, h = np.vstack([rows, inwards / scale**2]), np.append(np.zeros(len(rows)), 100.0)
+        best = linprog(cost, G, h, E, np.zeros(len(E)), (None, None))
         assert best.status == 0
         assert wrenches.contains(best.x, tolerance=1e-5)
 
 
 @pytest.mark.parametrize(("feet", "missing"), [(1, 3), (2, 1), (3, 0), (4, 0)])
-def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(
-    feet: int, missing: int
-) -> None:
+def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line(feet, missing):
     state, contacts = stance("go2", feet)
     wrenches = wrench_set(state, contacts)
     assert len(wrenches.equalities) == missing
@@ -201,7 +191,7 @@ def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line
         assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
 
 
-def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
+def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench():
     state, contacts = stance("go2", 4)
     wrenches = wrench_set(state, contacts)
     carrying = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
@@ -218,7 +208,7 @@ def test_a_margin_is_reached_by_forces_and_grows_with_the_wrench() -> None:
 # limits on the normal force
 
 
-def test_limits_make_the_set_bounded() -> None:
+def test_limits_make_the_set_bounded():
     state, contacts = stance("go2", 4, 0.4)
     limited = wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
     for direction in np.random.default_rng(0).normal(size=(20, 6)):
@@ -232,7 +222,7 @@ def test_limits_make_the_set_bounded() -> None:
         assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or best.fun == 0
 
 
-def test_the_maximum_scaling_is_where_membership_ends() -> None:
+def test_the_maximum_scaling_is_where_membership_ends():
     state, contacts = stance("talos", 2, 0.3)
     wrenches = wrench_set(state, contacts, max_normal_force=400.0)
     start = wrenches.rays @ np.full(wrenches.rays.shape[1], 30.0)
@@ -244,7 +234,7 @@ def test_the_maximum_scaling_is_where_membership_ends() -> None:
         assert wrenches.max_scaling(5.0 * direction, start) == pytest.approx(far / 5.0, rel=1e-6)
 
 
-def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight() -> None:
+def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight():
     """If the CoM is at ground level, only friction limits the push."""
     wrenches = of(
         [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]],
@@ -265,7 +255,7 @@ def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight()
         wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
 
-def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
+def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2():
     """A facet allows μ cos(π/n), an edge μ.
 
     If edges face the push, it is limited when the outer feet carry everything.
@@ -283,66 +273,8 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2() -> None:
         wrenches = wrench_set(state, contacts, facets=facets, facet_rotation=turn)
         angles, forces = wrenches.max_horizontal_forces(8)
         assert np.allclose(angles, np.pi / 4 * np.arange(8))
-        assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(
-            [forwards, diagonally, sideways, sideways, diagonally], rel=1e-6
-        )
-
-
-# the slice at the centre of mass
-
-
-@pytest.mark.parametrize("limit", [None, 90.0])
-@pytest.mark.parametrize(("name", "feet"), [("go2", 4), ("go2", 3), ("talos", 2)])
-def test_the_torque_slice_is_all_of_the_torques_that_go_with_the_weight(
-    name: str, feet: int, limit: float | None
-) -> None:
-    state, contacts = stance(name, feet, 0.4)
-    limit = None if limit is None else limit / 150.0 * state.robot.weight
-    wrenches = wrench_set(state, contacts, max_normal_force=limit)
-    corners = wrenches.moment_vertices()
-    carried = np.array([0.0, 0.0, state.robot.weight])
-    assert len(corners) >= 4
-    assert all(
-        wrenches.contains(np.concatenate([carried, corner]), tolerance=1e-4) for corner in corners
-    )
-    hull = ConvexHull(corners)
-    assert len(hull.vertices) == len(corners)
-    rng, centre = np.random.default_rng(0), corners.mean(axis=0)
-    for corner in corners[rng.integers(len(corners), size=8)]:
-        for stretch, held in ((0.99, True), (1.01, False)):
-            torque = centre + stretch * (corner - centre)
-            assert wrenches.contains(np.concatenate([carried, torque])) is held
-    for *normal, offset in rng.permutation(hull.equations)[:30]:
-        best = linprog(
-            -(np.array(normal) @ wrenches.rays[3:]),
-            *wrenches_limits(wrenches),
-            wrenches.rays[:3],
-            carried,
-            (0, None),
-        )
-        assert -best.fun == pytest.approx(-offset, abs=1e-6 * state.robot.weight)
-
-
-def wrenches_limits(wrenches: WrenchSet) -> tuple[Array | None, Array | None]:
-    if np.all(np.isinf(wrenches.max_normal_force)):
-        return None, None
-    return np.kron(np.eye(len(wrenches.points)), np.ones(4)), wrenches.max_normal_force
-
-
-def test_slices_of_stances_without_area_are_flat() -> None:
-    state, contacts = stance("go2", 1)
-    f = wrench_set(state, contacts).cones[0].rays[0] * 40.0
-    one = wrench_set(state, contacts).moment_vertices(f)
-    assert np.allclose(one, [np.cross(contacts.positions(state)[0] - state.com, f)])
-    state, contacts = stance("go2", 2)
-    two = wrench_set(state, contacts).moment_vertices()
-    assert np.linalg.matrix_rank(two - two[0], tol=1e-7) == 2
-
-
-def test_a_force_that_pulls_has_no_torques() -> None:
-    state, contacts = stance("go2", 4)
-    assert wrench_set(state, contacts).moment_vertices([0.0, 0.0, -1.0]).shape == (0, 3)
-    assert np.allclose(wrench_set(state, contacts).moment_vertices(np.zeros(3)), np.zeros((1, 3)))
+        expected = [forwards, diagonally, sideways, sideways, diagonally]
+        assert forces[[0, 1, 2, 6, 7]] / wrenches.weight == pytest.approx(expected, rel=1e-6)
 
 
 # where a robot can stand
@@ -364,9 +296,7 @@ def depth(polygon: Array, at: Array) -> float:
 @pytest.mark.parametrize(
     ("name", "feet"), [("go2", 4), ("go2", 3), ("solo8", 4), ("talos", 2), ("talos", 1)]
 )
-def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(
-    name: str, feet: int, mu: float
-) -> None:
+def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(name, feet, mu):
     robot, state = judges.load(name), judges.load(name).standing()
     contacts = judges.stance(robot, mu).only(*[foot.frame for foot in robot.feet][:feet])
     region = wrench_set(state, contacts).support_region()
@@ -379,7 +309,7 @@ def test_on_level_ground_the_support_region_is_the_hull_of_the_feet(
 
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 8))
-def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> None:
+def test_on_level_ground_this_holds_for_feet_anywhere(seed, feet):
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(-1, 1, (feet, 2)) + 5.0, np.full(feet, 0.3)])
     region = of(points, [UP] * feet, mu=rng.uniform(0.05, 1)).support_region()
@@ -389,7 +319,7 @@ def test_on_level_ground_this_holds_for_feet_anywhere(seed: int, feet: int) -> N
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed: int) -> None:
+def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(seed):
     wrenches = next(
         feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2
     )
@@ -413,12 +343,11 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
     assert seen == {True, False}
 
 
-def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() -> None:
+def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet():
     feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
     area = ConvexHull(feet[:, :2]).volume
-    outwards = np.column_stack(
-        [feet[:, :2], np.full(3, 0.8)]
-    )  # feet on a hilltop: friction must hold them
+    # feet on a hilltop: friction must hold them
+    outwards = np.column_stack([feet[:, :2], np.full(3, 0.8)])
     inwards = np.column_stack([-feet[:, :2], np.full(3, 0.8)])  # feet in a bowl
     on_top, in_bowl = (of(feet, normals, 0.3).support_region() for normals in (outwards, inwards))
     areas = [ConvexHull(region).volume if len(region) > 2 else 0.0 for region in (on_top, in_bowl)]
@@ -430,7 +359,7 @@ def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet() ->
     assert np.max(wall.support_region()[:, 0]) > 0.5 + 0.1
 
 
-def test_too_steep_a_slope_carries_nothing() -> None:
+def test_too_steep_a_slope_carries_nothing():
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
         region = of(
@@ -443,34 +372,28 @@ def test_too_steep_a_slope_carries_nothing() -> None:
         assert region.shape == ((3, 2) if stands else (0, 2))
 
 
-def test_limits_on_the_normal_force_cut_the_corners_off() -> None:
+def test_limits_on_the_normal_force_cut_the_corners_off():
     square = np.array([[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
     region = of(square, [UP] * 4, limit=50.0).support_region()
-    assert {tuple(np.round(corner, 9)) for corner in region} == {
-        (1.0, 0.0),
-        (-1.0, 0.0),
-        (0.0, 1.0),
-        (0.0, -1.0),
-    }
+    expected = {(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)}
+    assert {tuple(np.round(corner, 9)) for corner in region} == expected
     assert of(square, [UP] * 4, limit=20.0).support_region().shape == (0, 2)
 
 
-def test_walls_that_face_each_other_can_be_squeezed_without_end() -> None:
+def test_walls_that_face_each_other_can_be_squeezed_without_end():
     chimney = of(
         [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]],
         [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
         0.5,
     )
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
-    refused(chimney.moment_vertices, InputError, "max_normal_force")
     refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
     assert limited.contains([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
     assert len(limited.support_region()) >= 3
-    assert len(limited.moment_vertices()) >= 4
 
 
-def test_a_grip_from_all_sides_makes_every_wrench() -> None:
+def test_a_grip_from_all_sides_makes_every_wrench():
     directions = np.vstack([np.eye(3), -np.eye(3)])
     grip = of(directions, -directions, 0.7)
     assert grip.face_matrix.shape == (0, 6) and grip.equalities.shape == (0, 6)
@@ -480,9 +403,9 @@ def test_a_grip_from_all_sides_makes_every_wrench() -> None:
 # frames
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(seeds)
-def test_moving_everything_changes_nothing(seed: int) -> None:
+def test_moving_everything_changes_nothing(seed):
     here = feet_on_slopes(seed)
     step = np.random.default_rng(seed).normal(size=3)
     there = WrenchSet(
@@ -500,9 +423,9 @@ def test_moving_everything_changes_nothing(seed: int) -> None:
     )
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)
 @given(seeds)
-def test_turning_everything_turns_the_wrenches(seed: int) -> None:
+def test_turning_everything_turns_the_wrenches(seed):
     """The facets may start elsewhere after the rotation.
 
     Inner polyhedra stay within outer ones, nearly the same.
@@ -521,16 +444,14 @@ def test_turning_everything_turns_the_wrenches(seed: int) -> None:
 # input
 
 
-def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
+def test_contacts_that_make_no_set_of_wrenches_are_refused():
     state, contacts = stance("go2", 4)
     rope = LinearConstraint("rope", 1, lambda s, t: (np.eye(1, s.robot.nv), np.zeros(1)))
     for call, *named in (
         (lambda: wrench_set(state, fb.Contacts.none()),),
         (lambda: wrench_set(state, contacts + fb.Contacts([rope])), "rope"),
         (lambda: wrench_set(contacts, contacts), "state", "State", "Contacts"),
-        # type: ignore[arg-type]
         (lambda: wrench_set(state, state), "contacts", "Contacts", "State"),
-        # type: ignore[arg-type]
         (lambda: wrench_set(state, contacts, facets=2), "facets", 2),
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
@@ -544,7 +465,6 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused() -> None:
         (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
         (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
         (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
-        (lambda: wrench_set(state, contacts).moment_vertices([1.0]), "force", 1, 3),
         (
             lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
             "cones",

@@ -63,7 +63,7 @@ def squeezed(line: str) -> str:
     return re.sub(r"\s+", "", line)
 
 
-def test_the_package_of_an_assignment_holds_no_solution(assigned: Path) -> None:
+def test_an_assignment_holds_no_solution(assigned: Path) -> None:
     files = [path for path in assigned.rglob("*") if path.is_file()]
     found = {path: texts_of(path) for path in files}
     secret = {(n, t) for n, e in EXERCISES.items() for t in (e.solution, e.explanation) if t}
@@ -90,9 +90,7 @@ def test_the_package_of_an_assignment_holds_no_solution(assigned: Path) -> None:
     assert not any("solved" in path.name or "tests" in path.parts for path in files)
 
 
-def test_the_package_of_an_assignment_checks_answers_and_says_who_has_the_solutions(
-    assigned: Path, learner: Path
-) -> None:
+def test_an_assignment_checks_answers_and_names_the_teacher(assigned: Path, learner: Path) -> None:
     program = (
         "import sys; sys.dont_write_bytecode = True\n"
         "from floatbase.lessons import all_exercises, check, reveal\n"
@@ -117,7 +115,7 @@ def test_the_package_of_an_assignment_checks_answers_and_says_who_has_the_soluti
     assert int(known) == len(EXERCISES)
 
 
-def test_a_package_needs_known_lessons_and_a_new_folder(
+def test_an_assignment_needs_known_lessons_and_a_new_folder(
     assigned: Path, learner: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(InputError, match="99"):
@@ -129,7 +127,7 @@ def test_a_package_needs_known_lessons_and_a_new_folder(
         main(["assign", "99", "--to", "new", "--without-solutions"])
 
 
-def test_solutions_stay_for_those_who_have_them(capsys: pytest.CaptureFixture[str]) -> None:
+def test_reveal_prints_a_solution_of_the_whole_course(capsys: pytest.CaptureFixture[str]) -> None:
     for answer in (3.0, 4.0):
         check("00.1", answer)
     reveal("00.1")
@@ -142,7 +140,7 @@ OWN = [name for name, exercise in EXERCISES.items() if exercise.own]
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_own_numbers_have_their_own_right_answers(name: str) -> None:
+def test_personal_numbers_have_their_own_right_answers(name: str) -> None:
     exercise = EXERCISES[name]
     assert exercise.own is not None and len(set(exercise.own.values)) > 4
     standard = [answer for answer, hint in exercise.examples() if not hint]
@@ -155,7 +153,7 @@ def test_own_numbers_have_their_own_right_answers(name: str) -> None:
         assert str(value) in exercise.own.text.format(value)
 
 
-def test_a_student_always_gets_the_same_numbers_and_others_get_others(
+def test_a_student_always_gets_the_same_numbers(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     own = EXERCISES["00.1"].own
@@ -284,7 +282,7 @@ def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
     assert np.mean([p for p in forged if p is not None]) < full - 1
 
 
-def test_files_without_an_id_are_matched_by_name_and_others_are_reported(learner: Path) -> None:
+def test_a_gradebook_matches_files_without_an_id_by_name(learner: Path) -> None:
     (learner / "roster.csv").write_text(
         'Student,ID,SIS User ID,Section\n"Curie, Marie",1,m1,A\n"Noether, Emmy",2,e2,A\n'
     )
@@ -316,9 +314,7 @@ def test_files_without_an_id_are_matched_by_name_and_others_are_reported(learner
          "Marie\tCurie\tm1\t-\nEmmy\tNoether\te2\t4\n"),
     ],
 )  # fmt: skip
-def test_other_forms_of_rosters_are_read_and_grades_without_a_file_stay(
-    learner: Path, kind: str, roster: str
-) -> None:
+def test_a_gradebook_reads_other_forms_of_rosters(learner: Path, kind: str, roster: str) -> None:
     """Importers delete a grade whose cell is empty, so a student without a file has no row."""
     (learner / "roster.csv").write_text(roster)
     check("00.1", MASS * 11.81)
@@ -345,7 +341,7 @@ def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:
     return found
 
 
-def test_gradescope_gets_a_score_for_each_exercise_and_only_the_teacher_learns_whose_file_it_was(
+def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(
     learner: Path,
 ) -> None:
     class_of_sixty(learner)
@@ -373,7 +369,7 @@ def test_gradescope_gets_a_score_for_each_exercise_and_only_the_teacher_learns_w
     assert results(learner, [learner / "s00.json"])["score"] > 0
 
 
-def test_an_autograder_is_a_package_and_two_programs(
+def test_an_autograder_consists_of_a_package_and_two_programs(
     learner: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main(

@@ -39,16 +39,17 @@ def test_nine_concepts_have_three_questions_with_four_different_answers_each() -
     assert len(CONCEPTS) == 9 and {len(some) for some in CONCEPTS.values()} == {3}
     assert len({question.text for question in QUESTIONS}) == 27
     for question in QUESTIONS:
-        assert len(set(question.answers)) == 4
-        assert question.answers[question.place] == question.right
+        assert len(set(question.answers.values())) == 4
+        assert question.right in question.answers
     # guessing one letter pays for nobody
     assert all(4 <= KEY.count(letter) <= 9 for letter in LETTERS)
 
 
 def test_distractors_are_mistakes_that_the_course_knows() -> None:
     lessons = Path(floatbase.__file__).parent / "lessons"
-    named = [mistake for q in QUESTIONS for mistake in q.wrong.values() if mistake]
-    assert sum(any(q.wrong.values()) for q in QUESTIONS) >= 20 and len(named) >= 36
+    named = [mistake for q in QUESTIONS for mistake in q.mistakes.values()]
+    assert sum(bool(q.mistakes) for q in QUESTIONS) >= 20 and len(named) >= 36
+    assert all(set(q.mistakes) <= set(q.answers) - {q.right} for q in QUESTIONS)
     for mistake in named:
         name, hint = mistake.split(":")
         if name[-1].isdigit():
@@ -61,8 +62,8 @@ def test_distractors_are_mistakes_that_the_course_knows() -> None:
 
 def right_answer(words: str) -> str:
     """The right answer to the only question with these words."""
-    (found,) = [question.right for question in QUESTIONS if words in question.text]
-    return found
+    (found,) = [question for question in QUESTIONS if words in question.text]
+    return found.answers[found.right]
 
 
 def test_right_numbers_follow_from_plain_formulas() -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from browsers import browser_of_a_file
 
+from floatbase.errors import InputError
+from floatbase.lessons.publish import lesson_notebooks, read_notebook
 from floatbase.lessons.publish.__main__ import main
 from floatbase.lessons.publish.site import lecture
-from floatbase.lessons.question_texts import CONTEXTS, TEXTS
 from floatbase.lessons.questions import all_questions
-from floatbase.lessons.recalling import RECALLED
 
 browser = browser_of_a_file
 QUESTIONS = lecture.lecture_questions()
@@ -32,13 +32,24 @@ def test_each_lesson_has_four_questions_with_a_result_and_a_reason() -> None:
                 assert len(re.findall(r"\d+(?:\.\d+)?", result)) == question.count
 
 
-def test_texts_for_use_outside_a_lesson_are_about_known_questions() -> None:
-    asked = {one.question.name for some in QUESTIONS.values() for one in some}
-    assert set(CONTEXTS) | set(TEXTS) <= asked | set(RECALLED)
-    assert {
-        one.reason for some in QUESTIONS.values() for one in some if one.reason[-1] in ":?"
-    } == set()
-    assert QUESTIONS["P"][2].reason.startswith("At rest every foot pushes")
+def test_reasons_come_from_the_lesson_or_from_the_metadata_of_the_question() -> None:
+    reasons = {one.question.name: one.reason for some in QUESTIONS.values() for one in some}
+    assert [name for name, reason in reasons.items() if reason[-1] in ":?"] == []
+    assert reasons["P.h"].startswith("At rest every foot pushes")
+    assert reasons["02.c"][1:] in " ".join(text_of("02").split())
+    known = all_questions().values()
+    assert {one.name for one in known if one.reason} <= set(reasons)
+
+
+def text_of(lesson: str) -> str:
+    cells = read_notebook(lesson_notebooks()[lesson]).cells
+    return "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+
+
+def test_a_result_that_is_not_stored_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lecture, "results", lambda cells: {})
+    with pytest.raises(InputError, match=r"00\.a"):
+        lecture.lecture_questions.__wrapped__()
 
 
 def test_page_and_slides_hold_all_questions(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ def go2() -> Robot:
     return fb.load("go2")
 
 
-def test_the_worst_foot_is_how_far_a_stance_strayed(go2: Robot) -> None:
+def test_foot_displacement_is_that_of_the_worst_foot(go2: Robot) -> None:
     state = go2.standing()
     contacts = fb.Contacts.points(go2)
     lifted = state.replace(q=state.integrate(0.03 * np.eye(18)[2]))
@@ -28,7 +28,7 @@ def test_the_worst_foot_is_how_far_a_stance_strayed(go2: Robot) -> None:
     )
 
 
-def test_constant_torques_record_what_the_equation_says(go2: Robot) -> None:
+def test_a_run_with_constant_torques_records_the_forces_of_the_equations(go2: Robot) -> None:
     contacts = fb.Contacts.points(go2)
     record = lesson02.run_constant_torques(
         go2, contacts, np.zeros(12), judges.constrained, duration=0.01
@@ -38,33 +38,7 @@ def test_constant_torques_record_what_the_equation_says(go2: Robot) -> None:
     assert not record.tau.any()
 
 
-def test_the_equation_is_drawn_and_the_collapse_is_played(go2: Robot) -> None:
-    state, contacts = go2.standing(), fb.Contacts.points(go2)
-    figure = lesson02.draw_equation(fb.equations_of_motion(state, contacts))
-    assert [axis.get_title() for axis in figure.axes] == ["M q̈", "+ h", "= S τ", "+ Jᵀ λ"]
-    assert [label.get_text() for label in figure.axes[3].get_xticklabels()] == [
-        "FL",
-        "FR",
-        "RL",
-        "RR",
-    ]
-    states = [
-        state.replace(q=state.integrate(height * np.eye(18)[2])) for height in (0.0, 0.01, 0.02)
-    ]
-    view = fb.Viewer(go2)
-    try:
-        drawn = str(
-            lesson02.play_collapse_comparison(
-                view, states, states, contacts, 0.02
-            ).window.scene.file_commands()
-        )
-        assert "with b" in drawn
-        assert "way" in drawn
-    finally:
-        view.close()
-
-
-def test_the_smallest_holding_depends_on_the_unit_of_torque(go2: Robot) -> None:
+def test_the_least_squares_solution_depends_on_the_unit_of_torque(go2: Robot) -> None:
     """What the explanation of exercise 02.3 says of lstsq; both answers are right."""
     eom = fb.equations_of_motion(go2.standing(), fb.Contacts.points(go2))
     found = []

@@ -17,9 +17,6 @@ from floatbase.lessons.lesson05 import (
     friction_ratios,
     inclined_design,
     moving_and_goal_state,
-    plot_constrained_minimum,
-    show_forces,
-    show_moved_com,
     stretched_arm_state,
 )
 from floatbase.objectives import (
@@ -35,7 +32,7 @@ FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.3
 ROUNDING = 1e-9  # of forces of 100 N and levers of 1 m
 
 
-def test_05_3_is_out_of_reach_of_weights() -> None:
+def test_no_weights_solve_exercise_05_3() -> None:
     """No α and no weight of (23) keeps both the wrench and the friction ratios, whatever the normal
     force it prefers.
     """
@@ -53,7 +50,7 @@ def test_05_3_is_out_of_reach_of_weights() -> None:
                 assert not right("05.3", design)
 
 
-def test_the_wrench_of_05_1_is_that_of_the_controller() -> None:
+def test_exercise_05_1_has_the_wrench_of_the_controller() -> None:
     """Its cost on the forces is zero where they give that wrench, but for (23)."""
     now, goal = moving_and_goal_state()
     controller = AnalyticController(GO2, EOM.contacts, goal, bias_weight=1e-12)
@@ -63,7 +60,7 @@ def test_the_wrench_of_05_1_is_that_of_the_controller() -> None:
 
 
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
-def test_a_lean_is_friction_over_normal_force(normal: list[float]) -> None:
+def test_a_friction_ratio_is_tangential_over_normal_force(normal: list[float]) -> None:
     contacts = fb.Contacts.points(GO2, normals=normal)
     n, t = np.array(normal), np.array([0.0, 1.0, 0.0])
     forces = [10 * n + 5 * t, 10 * n, -10 * n + t, t]
@@ -72,7 +69,7 @@ def test_a_lean_is_friction_over_normal_force(normal: list[float]) -> None:
     )
 
 
-def test_the_arm_takes_the_centre_of_mass_along() -> None:
+def test_the_arm_moves_the_centre_of_mass() -> None:
     ahead, left, right_hand = (
         com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2)
     )
@@ -84,7 +81,7 @@ def test_the_arm_takes_the_centre_of_mass_along() -> None:
     np.testing.assert_allclose(turned, expected, atol=ROUNDING)
 
 
-def test_given_forces_are_measured_on_the_physics() -> None:
+def test_the_engine_measures_the_planned_forces() -> None:
     forces = inclined_design()(FORCE).minimiser()
     record = fb.rollout(
         fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1
@@ -94,29 +91,3 @@ def test_given_forces_are_measured_on_the_physics() -> None:
     )  # N: the robot has moved by 2 cm
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)
-
-
-def test_the_pictures_are_drawn() -> None:
-    view = fb.Viewer(GO2)
-    try:
-        forces = inclined_design()(FORCE).minimiser()
-        note = show_forces(view, EOM.state, EOM.contacts, forces, wish=[60, 0, 0])
-        assert "(60, 0, 0) N" in note and "(0, 0, 0) N·m" in note
-        assert {"wish", "wrench"} <= {path.split("/")[0] for path in view.renderer.picture}
-        assert (
-            "(60" in show_forces(view, EOM.state, EOM.contacts, forces)
-            and "wish" not in view.renderer.picture
-        )
-    finally:
-        view.close()
-    assert len(plot_constrained_minimum().axes) == 1
-    arm_view = fb.Viewer(stretched_arm_state(0.0).robot)
-    try:
-        drawn = show_moved_com(
-            arm_view, stretched_arm_state(1.0), stretched_arm_state(0.0), "before"
-        ).renderer.picture
-        np.testing.assert_allclose(
-            drawn["earlier/spot"].matrix[:2, 3], stretched_arm_state(0.0).com[:2], atol=ROUNDING
-        )
-    finally:
-        arm_view.close()

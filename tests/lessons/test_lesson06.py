@@ -2,41 +2,31 @@
 
 from __future__ import annotations
 
-import re
-
 import judges
 import numpy as np
 import pytest
 
 import floatbase as fb
 from floatbase.errors import InputError
-from floatbase.friction import FrictionCone, FrictionPolyhedron, wrench_set
+from floatbase.friction import FrictionPolyhedron
 from floatbase.lessons.lesson04 import measured_acceleration
 from floatbase.lessons.lesson05 import friction_ratios
 from floatbase.lessons.lesson06 import (
     ConeController,
     accelerate,
-    compass_row,
     constrained_minimiser,
     make_controller,
-    region_picture,
-    show_force,
-    show_polyhedron,
-    show_region,
-    show_slope,
     slope_normal,
     state_with_feet_at,
 )
 from floatbase.objectives import com_wrench_map
-from floatbase.viewer import Picture, shapes
-from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, hex_code
 
 UP = np.array([0.0, 0.0, 1.0])
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
 SOLVED = 1e-5  # N: what the QP solver leaves in rows of forces up to 200 N
 
 
-def test_the_smallest_cost_within_rows_is_found() -> None:
+def test_the_constrained_minimum_is_the_projection_onto_the_polyhedron() -> None:
     cost = fb.Quadratic.from_residual(np.eye(3), [3.0, 0.0, 1.0])
     rows = FrictionPolyhedron(UP, 0.5, 4).face_matrix
     found = constrained_minimiser(cost, rows)
@@ -48,7 +38,7 @@ def test_the_smallest_cost_within_rows_is_found() -> None:
     )
 
 
-def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed() -> None:
+def test_a_pushed_controller_plans_forces_inside_the_cones() -> None:
     controller = make_controller()
     assert isinstance(controller, ConeController)
     still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
@@ -70,7 +60,7 @@ def test_the_controller_stands_and_its_plans_keep_to_the_cones_when_it_is_pushed
     assert pushed.outcome == "completed"
 
 
-def test_dearer_moments_are_missed_by_less() -> None:
+def test_a_larger_weight_reduces_the_error_of_the_moment() -> None:
     state = make_controller().state
     aside = state.replace(
         v=np.eye(18)[1] * 1.5
@@ -92,7 +82,7 @@ def test_dearer_moments_are_missed_by_less() -> None:
     assert moment_then < 0.5 * moment and force_then > force > 1.0
 
 
-def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> None:
+def test_the_torques_produce_the_planned_forces() -> None:
     controller = make_controller()
     state = controller.robot.random_state(3, spread=0.05)
     q = controller.robot.standing().q.copy()
@@ -104,7 +94,7 @@ def test_torques_of_the_controller_bring_about_the_forces_that_it_plans() -> Non
     assert np.allclose(fb.forces_from_torques(eom)(command.tau), command.forces, atol=1e-6)
 
 
-def test_legs_reach_given_places_or_say_that_they_do_not() -> None:
+def test_feet_reach_their_positions_or_an_error_is_raised() -> None:
     robot = judges.load("go2")
     home = robot.standing()
     places = {
@@ -122,82 +112,17 @@ def test_a_slope_has_the_normal_of_its_angle() -> None:
     assert np.allclose(slope_normal(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
 
 
-def test_a_limit_of_the_smallest_cost_can_be_any_number() -> None:
+def test_the_constrained_minimum_accepts_any_limits() -> None:
     cost = fb.Quadratic.from_residual(np.eye(2), [3.0, 4.0])
     found = constrained_minimiser(cost, np.eye(2), [-1.0, 5.0])
     assert np.allclose(found, [-1.0, 4.0], atol=SOLVED)
     assert np.allclose(constrained_minimiser(cost, np.eye(2), 2.0), [2.0, 2.0], atol=SOLVED)
 
 
-def test_a_requested_acceleration_is_measured_where_friction_allows_it() -> None:
+def test_the_engine_measures_the_requested_acceleration_if_friction_suffices() -> None:
     record = accelerate([1.0, 0.0, 0.0])
     assert measured_acceleration(record)[0] == pytest.approx(1.0, rel=0.05)
     # the controller believes in more friction than the floor has
     wet = accelerate([4.0, 0.0, 0.0], mu=0.7, floor=0.2, facets=8)
     planned = friction_ratios(fb.Contacts.points(wet.robot), wet.planned[0])
     assert planned.max() > 0.3 and wet.slip().max() > 0.01
-
-
-@pytest.mark.parametrize(
-    ("force", "status"),
-    [((20, 0, 40), "inside"), ((28, 0, 40), "active"), ((0, 30, 40), "outside")],
-)
-def test_a_single_cone_has_the_colour_of_its_force(force: tuple[float, ...], status: str) -> None:
-    view = fb.Viewer(judges.load("go2"))
-    try:
-        text = show_force(view, force, 0.7)
-        picture = view.renderer.picture
-    finally:
-        view.close()
-    margin = FrictionCone(UP, 0.7).margin(force)
-    assert f"= {margin:.0f} N" in text and ("cannot provide" in text) == (margin < 0)
-    assert {hex_code(MEASURED), hex_code(CONE[status])} <= colours(picture)
-
-
-def colours(picture: Picture) -> set[str]:
-    """Colours of a picture's items: of those that may change theirs, and of arrows."""
-    found = {hex_code(item.colour[:3]) for item in picture.values() if item.colour is not None}
-    arrow = shapes.arrow(np.zeros(3), UP, MEASURED)
-    return found | {hex_code(MEASURED) for item in picture.values() if item.shape is arrow.shape}
-
-
-def test_the_pictures_are_drawn() -> None:
-    robot = judges.load("go2")
-    view = fb.Viewer(robot)
-    try:
-        assert "4 facets" in (drawn := show_polyhedron(view, 0.7, 4))
-        assert (
-            "inside 64 %" in drawn and "outside 127 %" in drawn and "weakest 0.49 inside" in drawn
-        )
-        assert "front 0.84" in show_slope(view, 22.0, 0.0)
-        level = show_slope(view, 0.0, 0.0)
-        assert all(float(x) < 0.1 for x in re.findall(r"(?:front|rear) (\d\.\d+)", level))
-        assert "where the CoM may be" in show_region(view, 20.0, 0.7)
-        assert "nowhere" in show_region(view, 20.0, 0.3)
-    finally:
-        view.close()
-    state, contacts = robot.standing(), fb.Contacts.points(robot)
-    figure = compass_row(
-        one=wrench_set(state, contacts),
-        two_turned=wrench_set(state, contacts, facet_rotation=np.pi / 4),
-    )
-    assert [axis.get_title() for axis in figure.axes] == ["one", "two turned"]
-    feet = contacts.positions(state)
-    assert region_picture(state, feet, feet[[0, 1, 3, 2], :2]).count("<polygon") == 2
-    assert region_picture(state, feet, np.zeros((0, 2))).count("<polygon") == 1
-
-
-def test_drawings_from_above_have_greys_and_the_colour_of_text() -> None:
-    robot = judges.load("go2")
-    state, contacts = robot.standing(), fb.Contacts.points(robot)
-    view = fb.Viewer(robot)
-    try:
-        drawn = [
-            show_polyhedron(view, 0.7, 4),
-            region_picture(state, contacts.positions(state), np.zeros((0, 2))),
-        ]
-    finally:
-        view.close()
-    for svg in drawn:
-        assert set(re.findall(r"#[0-9A-F]{6}", svg)) <= {hex_code(grey) for grey in GREYS}
-        assert 'fill="currentColor"' in svg and re.findall(r"<text[^>]*\sfill=", svg) == []

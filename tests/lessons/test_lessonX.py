@@ -1,11 +1,10 @@
-"""Lesson X: every fault fells a robot that is sound without it, hides, and is found by a program
-that sees only the record.
+"""Lesson X: every fault fells a robot that is sound without it. A program that sees only the record
+finds the fault.
 """
 
 from __future__ import annotations
 
 import pickle
-import re
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
@@ -23,29 +22,21 @@ from floatbase.lessons.lessonX import (
     Case,
     InjectedFault,
     black_boxes,
-    case_zero,
     crash_test,
-    draw_torque_comparison,
     faultless_boxes,
     faultless_cases,
     ground_normal,
     judge_line,
     lagged,
-    play_box,
-    plot_residual_force,
     random_cases,
     record_box,
     required_forces,
-    show_instant,
     sliding_friction_ratios,
 )
 from floatbase.playground import ModelMismatch
 
-SEEDS = (
-    1,
-    # others with --seed; 0 to 41 were tried by hand, 336 boxes: all fell that should, all were
-    # found, no one else
-)
+# --seed takes others; 0 to 41 were tried by hand: in all 336 boxes the program was right
+SEEDS = (1,)
 
 
 @cache
@@ -63,8 +54,10 @@ def cases(seed: int) -> tuple[tuple[Case, BlackBox], ...]:
     return tuple(zip(drawn, black_boxes(seed) + faultless_boxes(seed), strict=True))
 
 
-def of_fault(fault: str, seed: int = 1) -> tuple[Case, BlackBox]:
-    return next((case, box) for case, box in cases(seed) if case.injected_fault.kind == fault)
+@cache
+def missing_forces(seed: int) -> tuple[np.ndarray, ...]:
+    """What (7) needs besides the measured forces, for each case."""
+    return tuple(required_forces(box) for _, box in cases(seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -76,100 +69,78 @@ def test_six_boxes_hold_one_fall_of_each_fault(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_program_finds_every_fault_from_the_record_alone_and_accuses_no_innocent(
-    seed: int,
-) -> None:
-    said = {
-        box.name: (program()(box), judge_line(case, box, program()(box)))
-        for case, box in cases(seed)
-    }
-    assert [name for name, (_, verdict) in said.items() if not verdict.right] == []
-    assert said["N"][0] == said["K"][0] == "nothing"
+def test_a_program_finds_every_fault_from_the_record_and_none_without_one(seed: int) -> None:
+    found = {box.name: program()(box) for _, box in cases(seed)}
+    for case, box in cases(seed):
+        assert judge_line(case, box, found[box.name]).right, box
+    assert found["N"] == found["K"] == "nothing"
 
 
 @pytest.mark.parametrize("seed", SEEDS[:1])
-def test_without_its_fault_each_robot_twists_to_the_end(seed: int) -> None:
-    for case, _ in cases(seed)[:6]:
+def test_a_robot_without_its_fault_twists_to_the_end(seed: int) -> None:
+    for case, _ in cases(seed)[:2]:
         sound = record_box("sound", case.twists[0], InjectedFault())
         assert not sound.fell and len(sound) == 1500, case
         assert program()(sound) == "nothing"
 
 
-def test_other_seeds_make_other_orders_sizes_and_joints_and_the_same_seed_the_same() -> None:
+def test_equal_seeds_give_equal_cases_and_other_seeds_give_others() -> None:
     drawn = [random_cases(seed) for seed in range(20)]
     assert len({tuple(case.injected_fault.kind for case in some) for some in drawn}) > 10
-    for fault in FAULTS:
-        ones = [
-            case.injected_fault
-            for some in drawn
-            for case in some
-            if case.injected_fault.kind == fault
-        ]
-        assert len(
-            {(one.size, one.joints if fault == "swapped motors" else None) for one in ones}
-        ) > (0 if fault == "drift" else 9)
-    assert {
-        np.sign(c.injected_fault.size - 1)
-        for some in drawn
-        for c in some
-        if c.injected_fault.kind == "mass"
-    } == {-1, 1}
+    faults = [case.injected_fault for some in drawn for case in some]
+    for kind in set(FAULTS) - {"drift"}:
+        ones = [fault for fault in faults if fault.kind == kind]
+        sizes = {one.joints if kind == "swapped motors" else one.size for one in ones}
+        assert len(sizes) > 9
+    assert {np.sign(fault.size - 1) for fault in faults if fault.kind == "mass"} == {-1, 1}
     assert random_cases(4) == random_cases(4) != random_cases(5)
-    case, box = of_fault("slow motors")
+    case, box = next(pair for pair in cases(1) if pair[0].injected_fault.kind == "slow motors")
     again = case.record()
-    assert all(
-        np.array_equal(getattr(box, name), getattr(again, name))
-        for name in ("q", "v", "tau", "planned", "measured")
-    )
+    for name in ("q", "v", "tau", "planned", "measured"):
+        assert np.array_equal(getattr(box, name), getattr(again, name))
 
 
-def test_a_box_tells_nothing_but_the_record() -> None:
+def test_a_box_holds_nothing_but_the_record() -> None:
     names = {"name", "robot", "contacts", "time", "q", "v", "measured", "tau", "planned", "qdd"}
     assert {field.name for field in fields(BlackBox)} == names
     for case, box in cases(1):
         assert set(vars(box)) <= names
-        assert np.allclose(box.contacts.mus, 1.2)  # what was told, whatever it was
-        assert box.robot == fb.load("go2") and "ModelMismatch" not in repr(vars(box))
+        assert np.allclose(box.contacts.mus, 1.2)  # what the controller assumed
+        assert box.robot == fb.load("go2")
         text = pickle.dumps(box)
-        assert not any(
-            fault.encode() in text
-            for fault in ("swapped", "slow motors", "FirstOrderLag", "Mistake")
-        )
+        assert not any(word in text for word in (b"swapped", b"Lag", b"Mismatch", b"Fault"))
         assert str(case.injected_fault.size)[:6] not in repr(box)
         with pytest.raises(ValueError, match="read-only"):
             box.tau[0, 0] = 0.0
 
 
-def test_what_a_controller_was_told_is_the_truth_but_for_a_wrong_normal() -> None:
-    for case, box in cases(2):
+def test_the_assumed_normal_is_wrong_only_if_it_is_the_fault() -> None:
+    for case, box in cases(1):
         off = np.rad2deg(np.arccos(min(1.0, ground_normal(box) @ box.contacts.normals[0])))
         assert off == pytest.approx(
             case.injected_fault.size if case.injected_fault.kind == "normal" else 0.0, abs=0.2
         )
 
 
-def test_equation_7_holds_of_all_that_was_measured_whatever_the_controller_believed() -> None:
-    for case, box in cases(1):
-        base = np.linalg.norm(required_forces(box)[:, :3], axis=1)
+def test_equation_7_holds_for_all_measurements() -> None:
+    for (case, _), forces in zip(cases(1), missing_forces(1), strict=True):
+        base = np.linalg.norm(forces[:, :3], axis=1)
         if case.pushes:
             assert base.max() > 200
-        else:
-            assert np.median(base) < 2.0 and base[: min(len(base), 50)].max() < 10.0, (
-                case
-            )  # blows of the fall come later
+        else:  # blows of the fall come after 50 rows
+            assert np.median(base) < 2.0 and base[:50].max() < 10.0, case
 
 
-def test_motors_get_what_was_ordered_but_for_the_two_faults_of_motors() -> None:
-    for case, box in cases(1):
-        off = np.median(np.abs(required_forces(box)[:, 6:] - box.tau[:-1]), axis=0)
-        assert (off.max() > 0.5) == (
-            case.injected_fault.kind in ("slow motors", "swapped motors")
-        ), case
+def test_motors_follow_their_commands_except_with_a_fault_of_motors() -> None:
+    for (case, box), forces in zip(cases(1), missing_forces(1), strict=True):
+        off = np.median(np.abs(forces[:, 6:] - box.tau[:-1]), axis=0)
+        is_of_motors = case.injected_fault.kind in ("slow motors", "swapped motors")
+        assert (off.max() > 0.5) == is_of_motors, case
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_what_is_said_against_a_wrong_diagnosis_is_true(seed: int) -> None:
-    for case, box in cases(seed)[:6]:
+def test_the_evidence_against_a_wrong_diagnosis_is_true(seed: int) -> None:
+    for (case, box), forces in zip(cases(seed)[:6], missing_forces(seed), strict=False):
         fault, normal = case.injected_fault.kind, ground_normal(box)
         if fault != "friction":
             assert np.percentile([1.2, *sliding_friction_ratios(box, normal)], 90) > 1.15
@@ -179,7 +150,7 @@ def test_what_is_said_against_a_wrong_diagnosis_is_true(seed: int) -> None:
         lost = np.median([np.abs(plan[1]).max() / b for plan, b in zip(plans, drifts, strict=True)])
         assert (max(np.abs(plan[0]).max() for plan in plans) > 1.0) == (fault == "mass")
         assert lost > 0.99 if fault == "drift" else lost < 0.01
-        got, told = required_forces(box)[:, 6:], box.tau[:-1]
+        got, told = forces[:, 6:], box.tau[:-1]
         late = [
             np.median(np.abs(lagged(told, 0.002, ms) - got), axis=0).max()
             for ms in range(0, 120, 2)
@@ -190,11 +161,11 @@ def test_what_is_said_against_a_wrong_diagnosis_is_true(seed: int) -> None:
             assert late[0] < 0.5
 
 
-def test_forgotten_drift_alone_fells_the_robot() -> None:
+def test_a_forgotten_drift_fells_the_robot() -> None:
     assert crash_test("drift").fell
 
 
-def test_the_mistaken_controllers_are_those_of_belief() -> None:
+def test_a_wrong_mass_scales_the_planned_forces() -> None:
     state = judges.load("go2").standing()
     tasks = fb.standing_tasks(state)
     heavy = fb.WholeBodyController(
@@ -207,7 +178,7 @@ def test_the_mistaken_controllers_are_those_of_belief() -> None:
     assert box.planned[0, 2::3].sum() == pytest.approx(1.2 * box.robot.weight, rel=1e-3)
 
 
-def test_the_lag_is_that_of_first_order() -> None:
+def test_the_lag_is_of_first_order() -> None:
     orders = np.ones((200, 1))
     orders[0] = 0.0
     out = lagged(orders, 0.002, 40.0)
@@ -215,7 +186,7 @@ def test_the_lag_is_that_of_first_order() -> None:
     assert np.array_equal(lagged(orders, 0.002, 0.0), orders)
 
 
-def test_the_needed_torques_are_those_that_were_applied() -> None:
+def test_the_required_torques_are_those_that_were_applied() -> None:
     """The physics' own, which no box holds."""
     robot = judges.load("go2")
     state = robot.standing()
@@ -236,26 +207,3 @@ def test_the_needed_torques_are_those_that_were_applied() -> None:
     assert (
         np.abs(found[pushed, 0] - 30.0).max() < 1.0 and np.abs(found[~pushed][60:, 0]).max() < 1.0
     )
-
-
-def test_pictures_of_a_box() -> None:
-    box = case_zero()
-    lost = required_forces(box)
-    view = fb.Viewer(judges.load("go2"))
-    try:
-        told = show_instant(view, box, lost, 0.0)
-        later = show_instant(view, box, lost, 0.3)
-        play_box(view, box)
-    finally:
-        view.close()
-    assert told.endswith("0 N is missing in (7) on the base") and later != told
-    drawn = draw_torque_comparison(box, lost[:, 6:], 8, 46.0)
-    assert "RL_calf_joint" in drawn and drawn.count("<polyline") == 2 and "46 ms late" in drawn
-    ticks = [float(tick) for tick in re.findall(r'text-anchor="end">([-\d.]+)<', drawn)]
-    assert (
-        "N·m</text>" in drawn
-        and 0.0 in ticks
-        and len(ticks) >= 3
-        and np.allclose(np.diff(ticks), ticks[1] - ticks[0])
-    )
-    assert plot_residual_force(box, lost).axes[0].get_ylabel() == "force [N]"

@@ -1,6 +1,4 @@
-"""Panels: a slider shows the number that is computed with; a push goes where its handle points, and
-a line tells of it.
-"""
+"""Panels: sliders show the numbers that are computed with, and pushes follow the handle."""
 
 from __future__ import annotations
 
@@ -45,7 +43,7 @@ def slider_of(
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_goes_through_its_first_value(
+def test_a_slider_shows_the_numbers_that_are_computed_with(
     view: fb.Viewer, low: float, first: float, high: float, step: float
 ) -> None:
     slider, drawn = slider_of(view, low, first, high)
@@ -54,13 +52,6 @@ def test_a_slider_goes_through_its_first_value(
         assert (bound - low) / step == pytest.approx(round((bound - low) / step), abs=1e-6)
         assert float(format(bound, slider.readout_format)) == bound
     assert drawn == [first]
-
-
-@pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_shows_what_is_computed_with(
-    view: fb.Viewer, low: float, first: float, high: float, step: float
-) -> None:
-    slider, drawn = slider_of(view, low, first, high)
     for i in range(60):
         slider.value = min(low + i * slider.step, high)  # as a browser adds them up
         assert format(drawn[-1], slider.readout_format) == format(
@@ -76,25 +67,11 @@ def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
     assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
 
 
-def test_a_picture_keeps_its_share_beside_a_note_and_has_a_line_of_its_own_where_it_is_narrow(
-    view: fb.Viewer,
-) -> None:
-    panel = slider_panel(view, lambda x: "long " * 200, beside=True, x=(0.0, 0.5, 1.0))
-    row = panel.children[0]
-    picture, note = row.children
-    assert (picture.layout.flex, note.layout.flex, row.layout.flex_flow) == (
-        "1 1 62%",
-        "1 1 30%",
-        "row wrap",
-    )
-    assert picture.layout.min_width == "min(380px, 100%)" and note is panel.note
-
-
-def test_a_range_with_no_width_does_not_fail(view: fb.Viewer) -> None:
+def test_a_range_may_have_no_width(view: fb.Viewer) -> None:
     assert slider_of(view, 2.0, 2.0, 2.0)[1] == [2.0]
 
 
-def test_a_slider_names_its_unit_and_what_the_package_refuses_stands_in_the_note(
+def test_a_slider_names_its_unit_and_the_note_shows_errors(
     view: fb.Viewer,
 ) -> None:
     def draw(push_force: float) -> str:
@@ -112,7 +89,7 @@ def test_a_slider_names_its_unit_and_what_the_package_refuses_stands_in_the_note
 
 
 @pytest.mark.parametrize("beside", [False, True])
-def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside: bool) -> None:
+def test_a_displayed_panel_holds_its_picture(view: fb.Viewer, beside: bool) -> None:
     panel: SliderPanel = slider_panel(view, lambda x: None, beside=beside, x=(0.0, 1.0, 2.0))
     picture = (panel.children[0].children if beside else panel.children)[0]
     assert picture.children == ()
@@ -120,7 +97,7 @@ def test_a_panel_holds_its_picture_once_it_is_displayed(view: fb.Viewer, beside:
     assert picture.children[0].name == view.robot.name and "image/png" in data
 
 
-def test_a_slider_of_whole_numbers_has_only_those_also_without_a_kernel() -> None:
+def test_a_slider_of_integers_has_only_integers() -> None:
     panel = slider_panel(None, lambda rounds: f"{rounds:g}", rounds=range(31))
     slider = panel.sliders["rounds"]
     assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (
@@ -133,7 +110,7 @@ def test_a_slider_of_whole_numbers_has_only_those_also_without_a_kernel() -> Non
     assert {value % 1 for value in panel_samples(panel)["rounds"]} == {0.0}
 
 
-def test_a_panel_without_a_view_shows_what_its_function_returns() -> None:
+def test_a_panel_without_a_view_shows_the_result_of_its_function() -> None:
     panel = slider_panel(None, lambda x: f"<img alt='{x:.1f}'>", x=(0.0, 1.0, 2.0))
     panel._repr_mimebundle_()
     assert panel.view is None and panel.children == (panel.note, panel.sliders["x"])
@@ -176,14 +153,11 @@ def panel() -> Iterator[Pushed]:
 @pytest.mark.parametrize(
     ("force", "towards", "way", "words"),
     [
-        (40.0, 90.0, (0, 1, 0), "pushed with 40 N to the left for 0.1 s"),
         (-40.0, 90.0, (0, -1, 0), "pushed with 40 N to the right for 0.1 s"),
-        (30.0, 0.0, (1, 0, 0), "pushed with 30 N forwards for 0.1 s"),
-        (30.0, -180.0, (-1, 0, 0), "pushed with 30 N backwards for 0.1 s"),
         (30.0, 30.0, (np.sqrt(0.75), 0.5, 0), "pushed with 30 N towards 30° for 0.1 s"),
     ],
 )
-def test_the_handle_pushes_where_it_points(
+def test_a_push_has_the_direction_of_the_handle(
     panel: Pushed, force: float, towards: float, way: tuple[float, ...], words: str
 ) -> None:
     panel.towards.value = towards
@@ -198,10 +172,12 @@ def test_the_handle_pushes_where_it_points(
     assert time.monotonic() - start > 0.3
 
 
-def test_the_button_pushes_again_and_says_when_there_is_nothing_to_push_with(panel: Pushed) -> None:
+def test_the_button_pushes_again_and_refuses_a_push_of_zero(panel: Pushed) -> None:
     panel.push.click()
     assert panel.line.value == "The push is 0 N. Set the force first."
     assert panel.run.status == "paused"
+    panel.buttons["reset"].click()
+    assert panel.line.value == "running"
     panel.force.value = 20.0
     until(lambda: panel.arrow is not None)
     until(lambda: panel.arrow is None)
@@ -228,7 +204,7 @@ def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel: Pushed)
         until(lambda: panel.arrow is None)
 
 
-def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pushed) -> None:
+def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel: Pushed) -> None:
     panel.towards.value = 60.0
     panel.force.value = 600.0
     until(lambda: panel.line.value == "fell: press reset, or push again")
@@ -242,25 +218,14 @@ def test_a_fall_is_told_without_a_click_and_reset_puts_the_handle_back(panel: Pu
     assert panel.line.value == "running"
 
 
-def test_a_push_after_a_fall_always_pushes(panel: Pushed) -> None:
+def test_a_push_after_a_fall_starts_the_run_again(panel: Pushed) -> None:
     told = "pushed with 600 N towards 60° for 0.1 s"
     panel.towards.value = 60.0
     panel.force.value = 600.0
-    for _ in range(6):
+    for _ in range(3):
         until(lambda: panel.line.value == "fell: press reset, or push again")
         panel.push.click()
         assert panel.line.value == told and panel.run.status == "running"
-
-
-def test_a_reset_shows_what_the_run_does_and_no_old_word(panel: Pushed) -> None:
-    panel.force.value = 20.0
-    assert panel.line.value.startswith("pushed with")
-    panel.buttons["reset"].click()
-    assert panel.line.value == "running"
-    panel.push.click()
-    assert panel.line.value == "The push is 0 N. Set the force first."
-    panel.buttons["reset"].click()
-    assert panel.line.value == "running"
 
 
 def test_time_can_be_slowed_down(panel: Pushed) -> None:

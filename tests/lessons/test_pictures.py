@@ -1,5 +1,5 @@
-"""Pictures of a site: what panels keep for each stop, which files hold it, and that a browser draws
-it without a kernel.
+"""Pictures of a site: the samples of panels, their files, and a browser that draws them without a
+kernel.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def scene_at(
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(
+def test_samples_of_a_slider_span_its_range(
     low: float, first: float, high: float, step: float
 ) -> None:
     found = sample_values(low, first, high, step)
@@ -102,13 +102,10 @@ def test_stops_are_some_ten_and_go_through_what_the_slider_can_be(
         [(x - low) / step for x in found], [round((x - low) / step) for x in found], atol=1e-6
     )
     assert max(np.diff(found)) < 0.3 * (high - low)
+    assert sample_values(low, low, low, step) == (low,)
 
 
-def test_a_slider_without_a_range_has_one_stop() -> None:
-    assert sample_values(2.0, 2.0, 2.0, 1.0) == (2.0,)
-
-
-def test_few_combinations_are_all_computed_and_of_many_one_slider_at_a_time() -> None:
+def test_few_combinations_are_complete_and_many_move_one_slider_at_a_time() -> None:
     assert combinations([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
     alone, together = combinations([5, 5, 5], [1, 2, 4])
     assert (
@@ -124,7 +121,7 @@ def test_few_combinations_are_all_computed_and_of_many_one_slider_at_a_time() ->
 # panels -------------------------------------------------------------------------------------------
 
 
-def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more(
+def test_a_panel_stores_the_live_picture_of_each_sample(
     view: fb.Viewer,
 ) -> None:
     panel = squat(
@@ -162,7 +159,7 @@ def test_a_panel_keeps_of_each_stop_what_the_live_picture_would_show_and_no_more
     assert changed < 0.3 * meshes  # the robot's shape is held once
 
 
-def test_a_panel_for_a_site_is_left_as_it_was_and_names_its_sliders(view: fb.Viewer) -> None:
+def test_a_site_leaves_a_panel_unchanged_and_names_its_sliders(view: fb.Viewer) -> None:
     panel = squat(view, down=(0, 0.02, 0.1, "m"))
     before = dict(view.window.scene.file_entries())
     data = data_of(panel)
@@ -173,21 +170,7 @@ def test_a_panel_for_a_site_is_left_as_it_was_and_names_its_sliders(view: fb.Vie
     assert data["words"] and "one slider" not in data["words"]
 
 
-def test_many_sliders_move_one_at_a_time_and_the_page_says_so(view: fb.Viewer) -> None:
-    def draw(a: float, b: float, c: float) -> str:
-        return view.show(view.robot.standing(), title=f"{a} {b} {c}").robot.name
-
-    panel = slider_panel(view, draw, a=(0, 1, 9), b=(0, 1, 9), c=(0, 1, 9))
-    data = data_of(panel)
-    assert not data["together"] and "one slider moves at a time" in data["words"]
-    first = [control["first"] for control in data["controls"]]
-    assert all(
-        sum(int(i) != k for i, k in zip(stop.split(","), first, strict=True)) <= 1
-        for stop in data["stops"]
-    )
-
-
-def test_a_panel_without_a_view_keeps_its_notes() -> None:
+def test_a_panel_without_a_view_stores_its_notes() -> None:
     data = data_of(
         slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2))
     )
@@ -195,12 +178,12 @@ def test_a_panel_without_a_view_keeps_its_notes() -> None:
     assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
 
 
-def test_positions_of_a_control_must_be_there() -> None:
+def test_a_control_refuses_an_unknown_position() -> None:
     with pytest.raises(fb.errors.ViewerError, match="position 3"):
         static_export.Control("x", ("0", "1"), 3)
 
 
-def test_a_picture_that_moves_no_more_keeps_no_animation(view: fb.Viewer) -> None:
+def test_a_still_picture_has_no_animation(view: fb.Viewer) -> None:
     record = fb.rollout(fb.Simulation(view.robot), ConstantTorques(np.zeros(12)), 0.02)
     assert any(key[1] == ANIMATION for key in scene_at(data_of(view.play(record))))
     assert not any(
@@ -259,9 +242,7 @@ def placed(html: str) -> str:
     return re.findall(r'data-picture="([^"]+)"', html)[0]
 
 
-def test_files_hold_what_outputs_held_and_shared_meshes_once(
-    view: fb.Viewer, tmp_path: Path
-) -> None:
+def test_files_hold_the_outputs_and_shared_meshes_once(view: fb.Viewer, tmp_path: Path) -> None:
     made, data, names = Pictures(tmp_path), [], []
     for title in ("one", "two"):
         bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
@@ -282,9 +263,7 @@ def test_files_hold_what_outputs_held_and_shared_meshes_once(
         assert sum(map(len, own)) < 0.05 * sum(map(len, shared))
 
 
-def test_a_later_build_leaves_files_of_pictures_that_it_did_not_place(
-    view: fb.Viewer, tmp_path: Path
-) -> None:
+def test_a_later_build_keeps_the_files_of_an_earlier_one(view: fb.Viewer, tmp_path: Path) -> None:
     view.show(view.robot.standing())
     first, second = Pictures(tmp_path), Pictures(tmp_path)
     first.place(view._repr_mimebundle_())
@@ -295,7 +274,7 @@ def test_a_later_build_leaves_files_of_pictures_that_it_did_not_place(
     assert all(path.read_bytes() == content for path, content in before.items())
 
 
-def test_what_is_no_picture_is_not_placed_and_texts_are_escaped(tmp_path: Path) -> None:
+def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path: Path) -> None:
     made = Pictures(tmp_path)
     assert made.place({"text/html": "<b>3</b>"}) is None and made.place({}) is None
     panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})  # type: ignore[arg-type]
@@ -310,7 +289,7 @@ def test_what_is_no_picture_is_not_placed_and_texts_are_escaped(tmp_path: Path) 
     assert 'type="range"' in html and "aria-label" in html and "aria-valuetext" in html
 
 
-def test_the_playground_stands_still_and_says_why(go2: fb.Robot) -> None:
+def test_the_playground_of_a_site_stands_still(go2: fb.Robot) -> None:
     from floatbase.playground import playground
 
     field = playground("go2")
@@ -320,10 +299,10 @@ def test_the_playground_stands_still_and_says_why(go2: fb.Robot) -> None:
     field.close()
 
 
-def test_the_game_of_rows_has_every_set_of_rows() -> None:
+def test_a_site_has_every_set_of_constraints_of_the_game() -> None:
     from floatbase.lessons.lessonC import ActiveSetGame
 
-    game = ActiveSetGame()
+    game = ActiveSetGame([(0.5, -1.0)])
     data = data_of(game)
     bowls = data["controls"][0]["values"]
     assert len(data["stops"]) == len(bowls) * 2 ** len(game.rows)
@@ -444,7 +423,7 @@ def test_a_slider_moves_the_robot_without_a_kernel(page: Any) -> None:
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
+def test_a_sample_looks_the_same_after_any_other(page: Any) -> None:
     frame = inside(page)
     seen: dict[int, Any] = {}
     count = 1
@@ -462,7 +441,7 @@ def test_a_stop_looks_alike_whatever_was_shown_before(page: Any) -> None:
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_recording_waits_where_motion_is_unwanted_plays_on_request_and_rests_out_of_sight(
+def test_a_recording_plays_on_request_and_rests_out_of_sight(
     page: Any,
 ) -> None:
     frame = inside(page, 1)

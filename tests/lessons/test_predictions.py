@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from IPython.core.displaypub import CapturingDisplayPublisher
+from IPython.core.interactiveshell import InteractiveShell
 
 from floatbase.errors import InputError
 from floatbase.lessons import check, compare, predict, progress, review, rounded
-from floatbase.lessons.predictions import is_right
+from floatbase.lessons.predictions import RESULT_MIME, is_right
 
 CHOICES = ["in the push", "at rest", "in the first millisecond"]
 
@@ -306,3 +308,26 @@ def test_a_prediction_counts_as_right_within_a_tenth_of_the_result(
     said: Any, result: Any, unit: str, right: bool
 ) -> None:
     assert is_right(said, result, unit) is right
+
+
+@pytest.mark.parametrize(
+    ("result", "data"),
+    [
+        (43.1349, 43.0), (np.int64(1234), 1234), ([9.81, -10.2, 1e-9], [9.8, -10.0, 0.0]),
+        ("at rest", "at rest"), (np.nan, None),
+    ],
+)  # fmt: skip
+def test_a_result_travels_as_data_with_the_digits_that_are_shown(result: Any, data: Any) -> None:
+    """Digits that are not shown differ from processor to processor."""
+    publisher = CapturingDisplayPublisher()
+    shell = InteractiveShell.instance(display_pub_class=CapturingDisplayPublisher)
+    try:
+        shell.display_pub = publisher
+        compare("02.c", result)
+    finally:
+        InteractiveShell.clear_instance()
+    (output,) = publisher.outputs
+    text = output["data"]["text/plain"]
+    assert output["data"][RESULT_MIME] == {
+        "name": "02.c", "result": data, "shown": text.removeprefix("02.c: "),
+    }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Quadratic programs in the plane: what is drawn is what the rows say."""
+"""Plots of quadratic programs in the plane agree with their constraints and costs."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def random_qp(seed: int) -> QP:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_grey_region_is_what_the_rows_leave_of_the_box(seed: int) -> None:
+def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed: int) -> None:
     qp = random_qp(seed)
     corners = qp_plots.feasible_polygon(qp, BOX)
     assert np.all(corners @ qp.G.T <= qp.h + 1e-9)
@@ -55,29 +55,15 @@ def test_the_grey_region_is_what_the_rows_leave_of_the_box(seed: int) -> None:
         assert inside == (len(corners) > 2 and bool(np.all(turns >= 0.0)))
 
 
-def test_rows_that_leave_nothing_leave_no_corner() -> None:
+def test_infeasible_constraints_have_no_polygon() -> None:
     assert (
         len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX))
         == 0
     )
 
 
-def test_rows_lie_where_they_hold_with_equality_and_those_that_are_on_are_thick() -> None:
-    qp = qp_of(np.eye(2), [0, 0], [[1.0, 2.0], [0.0, -1.0]], [1.0, 0.5], ("slant", "table"))
-    axis = qp_plots.plot(qp, BOX, working_set=["table"], point=(0.5, -0.5))
-    lines: Any = axis.lines
-    slant, table, dot = lines
-    for line, G, h in zip((slant, table), qp.G, qp.h, strict=True):
-        assert np.allclose(line.get_xydata() @ G, h)
-    assert table.get_linewidth() > 2 * slant.get_linewidth()
-    assert dot.get_xydata().tolist() == [[0.5, -0.5]]
-    assert [text.get_text() for text in axis.texts] == ["slant", "table"]
-    assert axis.get_xlim() + axis.get_ylim() == BOX
-    plt.close("all")
-
-
 @pytest.mark.parametrize("seed", range(20))
-def test_the_normals_times_their_multipliers_end_where_the_negative_gradient_ends(
+def test_normals_times_multipliers_add_up_to_the_negative_gradient(
     seed: int,
 ) -> None:
     qp = random_qp(seed)
@@ -95,7 +81,7 @@ def test_the_normals_times_their_multipliers_end_where_the_negative_gradient_end
     plt.close("all")
 
 
-def test_level_curves_are_curves_of_one_objective() -> None:
+def test_a_level_curve_has_one_value_of_the_cost() -> None:
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
     for qp in (
         qp_of(H, [1.0, -0.5], [], []),
@@ -111,7 +97,7 @@ def test_level_curves_are_curves_of_one_objective() -> None:
     plt.close("all")
 
 
-def test_problems_that_do_not_lie_in_the_plane_are_refused() -> None:
+def test_only_problems_in_the_plane_are_accepted() -> None:
     with raises(InputError, "QP", 3):
         qp_plots.plot(
             QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))

@@ -1,6 +1,4 @@
-"""Numbers as text: two significant digits, zero below a floor, and nothing that the last bits
-decide.
-"""
+"""Numbers as text: two significant digits, zero below a floor, independent of the last bits."""
 
 from __future__ import annotations
 
@@ -36,7 +34,7 @@ def test_a_number_has_two_digits_and_no_minus_zero(number: Any, text: str) -> No
     assert rounded(number) == text
 
 
-def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
+def test_unit_digits_and_floor_can_be_chosen() -> None:
     assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == (
         "69 mm",
         "30°",
@@ -51,33 +49,31 @@ def test_a_unit_stands_behind_and_digits_and_floor_can_be_chosen() -> None:
     [
         ([0.1, 1e-12, -2], "(0.1, 0, -2)"), (np.array([43.4, 0.123, -0.0]), "(43, 0.12, 0)"),
         ([], "()"), ([3], "(3)"),
-        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"), ([np.nan, 1.0], "(not a number, "
-                                                                                   "1)"),
+        (np.eye(2), "((1, 0), (0, 1))"), ([1e9, 1.0], "(1e9, 0)"),
+        ([np.nan, 1.0], "(not a number, 1)"),
     ],
 )  # fmt: skip
-def test_an_array_is_written_entry_by_entry_and_what_rounding_left_in_it_is_zero(
-    numbers: Any, text: str
-) -> None:
+def test_small_entries_of_an_array_are_zero(numbers: Any, text: str) -> None:
     assert rounded(numbers) == text
 
 
-def test_with_no_floor_an_array_keeps_its_smallest_entries() -> None:
+def test_an_array_without_a_floor_keeps_its_smallest_entries() -> None:
     assert rounded([1.0, 3e-14], floor=0.0) == "(1, 3e-14)"
 
 
 @pytest.mark.parametrize("half", [12.5, 2.45, 0.125, 1.05, 99.5, 0.355, 1.55, -0.0655])
-def test_halves_are_rounded_away_from_zero_whatever_the_last_bits_are(half: float) -> None:
+def test_halves_are_rounded_away_from_zero_for_all_last_bits(half: float) -> None:
     assert rounded(half * (1 - LAST_BITS)) == rounded(half) == rounded(half * (1 + LAST_BITS))
     assert abs(float(rounded(half))) > abs(half)
 
 
 @given(st.floats(1e-3, 1e9) | st.floats(-1e9, -1e-3))
-def test_what_is_printed_is_near_the_number(x: float) -> None:
+def test_the_text_is_close_to_the_number(x: float) -> None:
     assert float(rounded(x)) == pytest.approx(x, rel=HALF_A_STEP + SECOND_ROUNDING)
     assert float(rounded(x, digits=12)) == pytest.approx(x, rel=1e-11)  # half of the twelfth digit
 
 
 @pytest.mark.parametrize("nothing", [True, [True, False], "69", None, 1j, {}, [1.0, "x"]])
-def test_what_holds_no_numbers_is_refused(nothing: Any) -> None:
+def test_values_without_numbers_are_refused(nothing: Any) -> None:
     with pytest.raises(InputError, match="must be a number or an array of numbers"):
         rounded(nothing)

@@ -15,8 +15,8 @@ from browsers import browser_of_a_file, served
 import floatbase.lessons.publish.site as site
 from floatbase.errors import InputError
 from floatbase.lessons import all_exercises, import_answers, progress, review
-from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook
-from floatbase.lessons.questions import all_questions
+from floatbase.lessons.publish import NOTEBOOKS, grades, lesson_notebooks, read_notebook
+from floatbase.lessons.questions import Question, all_questions
 from floatbase.lessons.recalling import due_questions
 from floatbase.lessons.submission import FILE_FORMAT
 
@@ -35,8 +35,8 @@ class NoPictures:
 
 def elements(lesson: str) -> list[str]:
     """The forms of a lesson, as HTML."""
-    path = next(NOTEBOOKS.glob(f"{lesson}_*.ipynb"))
-    prepared = site.prepare_lesson(read_notebook(path), NoPictures(), {})
+    notebook = read_notebook(lesson_notebooks()[lesson])
+    prepared = site.prepare_lesson(notebook, NoPictures(), {})
     cells = [cell.source for cell in prepared.cells if "data-answers" in cell.source]
     cells = [cell for cell in cells if "answers-recall" not in cell]
     return [cell.removeprefix("```{raw} html\n").removesuffix("\n```") for cell in cells]
@@ -51,14 +51,11 @@ LESSONS = sorted({question.lesson for question in all_questions().values()})
 
 @pytest.mark.parametrize("lesson", LESSONS)
 def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson: str) -> None:
-    cells = read_notebook(next(NOTEBOOKS.glob(f"{lesson}_*.ipynb"))).cells
-    code = [cell for cell in cells if cell.cell_type == "code"]
-    results = site.printed_results(code)
-    asked = [cell.source for cell in code if "predict" in cell.metadata.get("tags", [])]
-    forms = [site.prediction_form(source, results) for source in asked]
+    results = site.results(read_notebook(lesson_notebooks()[lesson]).cells)
+    asked = [question for question in all_questions().values() if question.lesson == lesson]
+    forms = [site.prediction_form(question, results[question.name]) for question in asked]
     found = [data_of(form.source) for form in forms if form]
-    names = [name for name, question in all_questions().items() if question.lesson == lesson]
-    assert [data["name"] for data in found] == names
+    assert [data["name"] for data in found] == [question.name for question in asked]
     for data in found:
         if data["choices"]:
             assert data["right"] == data["result"] in data["choices"]
@@ -66,6 +63,21 @@ def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson:
             numbers = data["result"] if isinstance(data["result"], list) else [data["result"]]
             assert len(numbers) == data["count"] == len(data["right"])
             assert all(a <= x <= b for x, (a, b) in zip(numbers, data["right"], strict=True))
+
+
+@pytest.mark.parametrize(
+    ("question", "result"),
+    [
+        (Question("11.a", "", "", "", choices=("more", "less")), "more or less"),
+        (Question("11.a", "", "", "", count=2), [1.0, 2.0, 3.0]),
+        (Question("11.a", "", "", ""), None),  # not a number
+    ],
+)
+def test_a_result_that_answers_another_question_makes_no_form(
+    question: Question, result: Any
+) -> None:
+    assert site.prediction_form(question, None) is None
+    assert site.prediction_form(question, {"result": result, "shown": ""}) is None
 
 
 def test_exercises_of_a_few_numbers_have_a_form_and_the_judges_own_hints() -> None:

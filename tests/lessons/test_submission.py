@@ -1,13 +1,10 @@
-"""Handing in: answers come back as they were given, are judged again, and no file runs code or ends
-a judgement.
-"""
+"""Handing in: files keep the answers, grading judges them again, and no file runs code."""
 
 from __future__ import annotations
 
 import csv
 import json
 import os
-import subprocess
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from disk import full_disk
 from hints import LIFTED, ODD
 
 import floatbase as fb
@@ -48,7 +46,7 @@ def same(a: Any, b: Any) -> bool:
     return bool(np.array_equal(a, b))
 
 
-def test_every_kind_of_answer_of_the_course_comes_back_to_the_last_bit() -> None:
+def test_a_file_keeps_every_kind_of_answer_to_the_last_bit() -> None:
     placeholders = {name: exercise.placeholder() for name, exercise in all_exercises().items()}
     answers = {name: answer for name, answer in placeholders.items() if not callable(answer)}
     assert len(answers) > 30
@@ -56,14 +54,14 @@ def test_every_kind_of_answer_of_the_course_comes_back_to_the_last_bit() -> None
     assert [name for name, answer in answers.items() if not same(answer, back[name])] == []
 
 
-def test_odd_answers_are_kept_in_some_form_too() -> None:
+def test_a_file_keeps_odd_answers_in_some_form() -> None:
     endless: list[Any] = []
     endless.append(endless)
     for odd in [*ODD.values(), endless, np.zeros((1000, 1000)), lambda x: x]:
         json.dumps(progress.as_json(odd))
 
 
-def test_a_file_is_judged_again_and_its_claims_do_not_count(
+def test_grading_judges_the_answers_and_not_the_claims_of_a_file(
     learner: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for answer in (3.0, LIFTED, 4.0):
@@ -89,7 +87,7 @@ def test_a_file_is_judged_again_and_its_claims_do_not_count(
     } == {"wrong"}
 
 
-def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_again(
+def test_hand_in_asks_to_check_again_answers_that_were_not_kept(
     learner: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     progress.append("00.1", {"tries": 1, "right": 1})
@@ -102,7 +100,7 @@ def test_who_solved_an_exercise_before_answers_were_kept_is_asked_to_check_it_ag
     assert "once more" not in capsys.readouterr().out
 
 
-def test_code_is_kept_to_be_read_and_never_run(learner: Path) -> None:
+def test_grading_shows_code_and_never_runs_it(learner: Path) -> None:
     ran = []
 
     def row_to_drop(W: Any, prices: Any) -> None:
@@ -127,7 +125,7 @@ HOSTILE = (
 
 
 @pytest.mark.parametrize("kept", HOSTILE, ids=range(len(HOSTILE)))
-def test_an_answer_of_any_form_is_judged_without_an_error(learner: Path, kept: Any) -> None:
+def test_grading_accepts_an_answer_of_any_form(learner: Path, kept: Any) -> None:
     entry = {"tries": 1, "right": 1, "answer": kept}
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
@@ -151,7 +149,7 @@ NO_FILE = (
 
 
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
-def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
+def test_grading_refuses_files_that_hand_in_did_not_write(learner: Path, text: str) -> None:
     (learner / "a.json").write_text(text)
     with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
@@ -159,7 +157,7 @@ def test_what_hand_in_did_not_write_is_told(learner: Path, text: str) -> None:
         grades.grade_file(learner / "none.json")
 
 
-def test_nothing_to_hand_in_no_name_and_no_place_are_told(learner: Path) -> None:
+def test_hand_in_needs_an_answer_a_name_and_a_folder(learner: Path) -> None:
     with pytest.raises(InputError, match="nothing to hand in yet"):
         hand_in("Ada")
     check("00.1", 3.0)
@@ -171,20 +169,17 @@ def test_nothing_to_hand_in_no_name_and_no_place_are_told(learner: Path) -> None
     assert hand_in("../../Ada").parent == Path(".")
 
 
-def test_a_class_is_one_table(learner: Path) -> None:
+def test_a_class_becomes_one_table(learner: Path, capsys: pytest.CaptureFixture[str]) -> None:
     check("00.1", LIFTED)
     files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1", "a;=2")]
     (learner / "holiday.json").write_text("{}")
-    command = [sys.executable, "-m", "floatbase.lessons.publish", "grade", "holiday.json"]
-    said = subprocess.run(
-        [*command, *files, "--table", "marks.csv"], capture_output=True, text=True
-    )
-    assert said.returncode == 1  # a file could not be read
-    assert (
-        said.stdout.count("1 of ") == 4
-        and "Émilie du Châtelet" in said.stdout
-        and "holiday.json was not written" in said.stderr
-    )
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main(["grade", "holiday.json", *files, "--table", "marks.csv"])
+    assert ended.value.code == 1  # a file could not be read
+    printed = capsys.readouterr()
+    assert printed.out.count("1 of ") == 4 and "Émilie du Châtelet" in printed.out
+    assert "holiday.json was not written" in printed.err
     rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
     assert len(rows) == 4 * len(all_exercises())
     assert {row["file"] for row in rows} == {Path(file).name for file in files}
@@ -240,13 +235,13 @@ def test_learners_with_similar_names_can_hand_in_at_once(
 
 
 @pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
-def test_a_folder_that_is_no_path_is_refused(learner: Path, folder: Any) -> None:
+def test_hand_in_refuses_a_folder_that_is_no_path(learner: Path, folder: Any) -> None:
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):
         hand_in("Ada", folder)
 
 
-def test_of_two_files_of_a_learner_the_last_one_in_time_counts(learner: Path) -> None:
+def test_the_last_of_two_files_of_a_learner_counts(learner: Path) -> None:
     check("00.1", LIFTED)
     files = []
     for time in ("2026-05-02T10:00:00+00:00", "2026-05-01T10:00:00+00:00"):
@@ -263,7 +258,7 @@ def test_of_two_files_of_a_learner_the_last_one_in_time_counts(learner: Path) ->
         assert {one.file for one in found} == kept
 
 
-def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
+def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner: Path) -> None:
     for answer in (1.0, 2.0):
         check("00.1", answer)
     assert progress.answers() == {"00.1": 2.0}
@@ -272,7 +267,7 @@ def test_the_last_right_answer_is_kept_or_else_the_last(learner: Path) -> None:
     assert progress.answers() == {"00.1": LIFTED}
 
 
-def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
+def test_lessons_for_teachers_hold_the_solutions(learner: Path) -> None:
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     path = learner / "solutions" / f"{lesson.stem}.solved.ipynb"
     assert write_solutions(path.parent, [lesson]) == [f"{path.name}: new"]
@@ -285,7 +280,7 @@ def test_solutions_for_teachers_stand_in_the_lessons(learner: Path) -> None:
     assert len(cells) == len(read_notebook(lesson).cells) + explained
 
 
-def test_solutions_that_a_teacher_has_annotated_are_kept(learner: Path) -> None:
+def test_annotated_solutions_are_kept(learner: Path) -> None:
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     write_solutions(learner, [lesson])
     assert write_solutions(learner, [lesson]) == []
@@ -314,18 +309,12 @@ def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
     assert len(table.read_text().splitlines()) > len(all_exercises())
 
 
-def test_a_full_disk_leaves_the_file_of_answers_that_was_handed_in_before(learner: Path) -> None:
+def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner: Path) -> None:
     check("00.1", 3.0)
     path = hand_in("Ada")
     kept = path.read_bytes()
-    program = (
-        "import resource, signal; from floatbase.lessons import hand_in\n"
-        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))\n"
-        "hand_in('Ada')"
-    )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert "InputError" in run.stderr
+    with full_disk(10), pytest.raises(InputError):
+        hand_in("Ada")
     assert path.read_bytes() == kept and list(Path().glob("*answers*")) == [path]
 
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import pytest
+from disk import full_disk
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from floatbase.errors import InputError
@@ -56,13 +55,13 @@ def update(course: Path, n: int = 2) -> None:
     (course / "page.md").write_text(f"a page, {n}")
 
 
-def test_a_copy_does_not_answer_what_it_asks_the_learner_to_predict(course: Path) -> None:
+def test_a_copy_has_no_outputs(course: Path) -> None:
     write(course / LESSON, "first = 1", output="1\n")
     prepare_workspace(course)
     assert nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells[0].outputs == []
 
 
-def test_a_copy_asks_for_predictions_and_keeps_claims_folded(course: Path) -> None:
+def test_a_copy_keeps_predictions_and_folded_claims(course: Path) -> None:
     question = new_code_cell(
         'predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"}
     )
@@ -96,7 +95,7 @@ def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
     assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
 
 
-def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
+def test_learners_of_one_installed_course_have_separate_copies(
     course: Path, tmp_path: Path
 ) -> None:
     folders = [tmp_path / "homes" / name / "course" for name in ("ada", "bob")]
@@ -111,7 +110,17 @@ def test_learners_of_one_installed_course_have_copies_of_their_own_elsewhere(
     assert not (course / MY_FOLDER).exists()
 
 
-def test_a_package_without_the_course_says_so(tmp_path: Path) -> None:
+def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path: Path) -> None:
+    course, program = tmp_path / "notebooks", tmp_path / "examples" / "wbc.py"
+    for folder in (course, program.parent):
+        folder.mkdir()
+    write(course / LESSON, "first = 1")
+    program.write_text("q = 1\n")
+    assert prepare_workspace(course) == [f"{LESSON}: new", "wbc.py: new"]
+    assert (course / MY_FOLDER / "wbc.py").read_text() == program.read_text()
+
+
+def test_a_package_without_lessons_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
         match=r"There are no lessons in .*notebooks\. Install floatbase from its repository",
@@ -128,7 +137,7 @@ def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
 
 
 @pytest.mark.parametrize("forget", [False, True])
-def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forget: bool) -> None:
+def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) -> None:
     """Whichever file the learner continues in, and also when the record of copies is lost."""
     write(mine / LESSON, "first = 'my answer'")
     for n, name in ((2, NEW), (3, NEW2)):
@@ -149,7 +158,7 @@ def test_newer_lessons_are_laid_beside_whatever_was_written_in(mine: Path, forge
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_a_text_beside_that_nobody_wrote_in_follows_the_course_and_stays_away_once_removed(
+def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(
     mine: Path,
 ) -> None:
     write(mine / LESSON, "first = 'my answer'")
@@ -199,7 +208,7 @@ CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_what_counts_as_writing(course: Path, change: str) -> None:
+def test_only_edits_of_a_learner_count_as_writing(course: Path, change: str) -> None:
     counts, make = CHANGES[change]
     prepare_workspace(course)
     copy = course / MY_FOLDER / LESSON
@@ -224,7 +233,7 @@ def test_what_counts_as_writing(course: Path, change: str) -> None:
         "\0",
     ],
 )
-def test_a_damaged_memory_costs_nothing_that_was_written(mine: Path, text: str) -> None:
+def test_a_damaged_record_keeps_everything_written(mine: Path, text: str) -> None:
     (mine / LESSON).write_text("half a noteb")
     (mine / ".from.json").write_text(text)
     update(mine.parent)
@@ -261,7 +270,7 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_what_stands_in_the_way_of_one_file_is_reported_and_the_others_are_updated(
+def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(
     mine: Path, obstacle: str
 ) -> None:
     update(mine.parent)
@@ -276,7 +285,7 @@ def test_what_stands_in_the_way_of_one_file_is_reported_and_the_others_are_updat
     assert not (mine.parent / "nowhere.ipynb").exists()
 
 
-def test_nothing_is_written_through_a_link_and_none_is_replaced(mine: Path) -> None:
+def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
     (mine.parent / "elsewhere").mkdir()
     for name in (LESSON, "page.md", NEW):
         kept = mine.parent / "elsewhere" / name
@@ -303,18 +312,7 @@ def test_a_folder_that_cannot_be_created_is_reported(
         prepare_workspace(course)
 
 
-@contextmanager
-def full_disk(size: int) -> Iterator[None]:
-    """No file can grow beyond `size` bytes."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) -> None:
+def test_a_full_disk_keeps_whole_files_and_later_updates(mine: Path) -> None:
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the record, none for the lesson
@@ -326,7 +324,7 @@ def test_a_full_disk_leaves_whole_files_and_costs_no_later_update(mine: Path) ->
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
 
 
-def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Path) -> None:
+def test_a_copy_has_the_form_that_jupyter_writes(course: Path, tmp_path: Path) -> None:
     """So that saving without a change changes nothing."""
     prepare_workspace(course)
     copy, again = course / MY_FOLDER / LESSON, tmp_path / "again"
@@ -334,7 +332,7 @@ def test_a_copy_is_the_notebook_as_jupyter_writes_it(course: Path, tmp_path: Pat
     assert copy.read_text(encoding="utf-8") == again.read_text(encoding="utf-8")
 
 
-def test_preparing_loads_no_physics_no_pictures_and_no_kernel() -> None:
+def test_preparing_a_workspace_imports_no_heavy_package() -> None:
     heavy = ("mujoco", "meshcat", "matplotlib", "ipywidgets", "nbformat", "nbclient", "mistune")
     code = (
         f"import sys, floatbase.lessons.publish.__main__; print([m for m in {heavy} if m in "

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import judges
 import numpy as np
 import pinocchio as pin
@@ -28,7 +26,7 @@ def angular_momentum(state: fb.State) -> np.ndarray:
     return np.array(momentum.angular)
 
 
-def test_the_residual_is_the_rate_of_the_angular_momentum_less_the_desired_one(name: str) -> None:
+def test_the_residual_is_the_rate_of_the_angular_momentum_less_the_desired_one(name):
     for seed, state in enumerate(judges.states(name, 3)):
         rng = np.random.default_rng(seed)
         eom = fb.equations_of_motion(state, judges.stance(state.robot))
@@ -48,7 +46,7 @@ def test_the_residual_is_the_rate_of_the_angular_momentum_less_the_desired_one(n
             assert np.max(np.abs(found - expected)) < 1e-5 * (1.0 + np.max(np.abs(expected)))
 
 
-def test_both_backends_agree_on_it() -> None:
+def test_both_backends_agree_on_it():
     robot = judges.load("go2")
     tasks = [*fb.standing_tasks(robot.standing()), AngularMomentumTask(weight=1.0)]
     compiled, reference = judges.pair(robot, judges.stance(robot), tasks)
@@ -56,7 +54,7 @@ def test_both_backends_agree_on_it() -> None:
         assert judges.difference(compiled, reference, state) < 1e-8 * robot.torque_limits.max()
 
 
-def test_in_the_air_no_torque_changes_the_angular_momentum() -> None:
+def test_in_the_air_no_torque_changes_the_angular_momentum():
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     residual = AngularMomentumTask(kd=2.0).residual(eom)
@@ -64,7 +62,7 @@ def test_in_the_air_no_torque_changes_the_angular_momentum() -> None:
     assert np.allclose(residual(qdd), 2.0 * angular_momentum(state), atol=1e-9)
 
 
-def test_one_joint_has_an_angular_momentum_too(tmp_path: Path) -> None:
+def test_one_joint_has_an_angular_momentum_too(tmp_path):
     """Pinocchio's matrices of one joint have one dimension less."""
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(PENDULUM)
@@ -76,7 +74,7 @@ def test_one_joint_has_an_angular_momentum_too(tmp_path: Path) -> None:
     assert np.allclose(residual([3.0]), [0.0, 0.1 * 3.0 + 2.0 * 0.1 * 2.0, 0.0], atol=1e-12)
 
 
-def test_a_state_is_as_it_was_after_the_residual() -> None:
+def test_a_state_is_as_it_was_after_the_residual():
     """The residual is computed in the memory that holds the state's other results."""
     for state in judges.states("go2", 3):
         fresh = state.replace()
@@ -89,7 +87,7 @@ def test_a_state_is_as_it_was_after_the_residual() -> None:
         assert np.allclose(state.com_drift, fresh.com_drift, rtol=0.0, atol=1e-12)
 
 
-def test_bad_targets_are_refused_by_name() -> None:
+def test_bad_targets_are_refused_by_name():
     refused(lambda: AngularMomentumTask(np.zeros(2)), InputError, "momentum", 2, 3)
     refused(lambda: AngularMomentumTask(kd=-1.0), InputError, "kd", -1)
     both = {"momentum": lambda t: np.zeros(3), "rate": np.ones(3)}

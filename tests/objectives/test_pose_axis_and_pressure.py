@@ -34,9 +34,7 @@ def relative_pose(frame: str, reference: str, state: fb.State) -> np.ndarray:
     return np.linalg.inv(world_pose(state, reference)) @ world_pose(state, frame)
 
 
-def test_the_relative_pose_residual_is_the_relative_acceleration_less_the_desired_one(
-    name: str,
-) -> None:
+def test_the_relative_pose_residual_is_the_relative_acceleration_less_the_desired_one(name):
     for seed, state in enumerate(judges.states(name, 4)):
         rng = np.random.default_rng(seed)
         robot, eom = state.robot, fb.equations_of_motion(state, judges.stance(state.robot))
@@ -67,9 +65,7 @@ def test_the_relative_pose_residual_is_the_relative_acceleration_less_the_desire
             assert np.allclose(task.residual(eom)(qdd), expected, atol=5e-5)
 
 
-def test_the_axis_residual_is_its_acceleration_on_the_sphere_less_the_desired_one(
-    name: str,
-) -> None:
+def test_the_axis_residual_is_its_acceleration_on_the_sphere_less_the_desired_one(name):
     for seed, state in enumerate(judges.states(name, 4)):
         rng = np.random.default_rng(seed)
         eom = fb.equations_of_motion(state, judges.stance(state.robot))
@@ -101,9 +97,7 @@ def test_the_axis_residual_is_its_acceleration_on_the_sphere_less_the_desired_on
             assert np.allclose(n @ residual.A, 0.0, atol=1e-12)  # rotation about it is free
 
 
-def test_an_axis_opposite_to_its_direction_turns_by_half_a_turn_and_one_along_it_not_at_all() -> (
-    None
-):
+def test_an_axis_opposite_to_its_direction_turns_by_half_a_turn_and_one_along_it_not_at_all():
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     n = state.frame_pose("base").rotation @ UP
@@ -112,7 +106,7 @@ def test_an_axis_opposite_to_its_direction_turns_by_half_a_turn_and_one_along_it
         assert np.isclose(np.linalg.norm(b), angle, atol=1e-7) and abs(b @ n) < 1e-12
 
 
-def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_the_forces() -> None:
+def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_the_forces():
     for robot_name in ("go2", "talos"):
         robot = judges.load(robot_name)
         state, contacts = robot.standing(), judges.stance(robot)
@@ -134,7 +128,7 @@ def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_t
                 assert not np.any(residual.b)
 
 
-def test_both_backends_agree_on_them() -> None:
+def test_both_backends_agree_on_them():
     for robot_name, pair in (("go2", ("FL_hip", "RR_thigh")), ("talos", HANDS)):
         robot = judges.load(robot_name)
         at, contacts = robot.standing(), judges.stance(robot)
@@ -150,7 +144,7 @@ def test_both_backends_agree_on_them() -> None:
             assert judges.difference(*both, state, 0.1 * i) < judges.agreement(robot)
 
 
-def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves() -> None:
+def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves():
     robot = judges.load("talos")
     at = robot.standing()
     goal = at.frame_pose(HANDS[1]).actInv(at.frame_pose(HANDS[0])).homogeneous
@@ -169,7 +163,7 @@ def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves() -
     assert np.linalg.norm(judges.turn_between(left[:3, :3], np.eye(3))) < 0.01
 
 
-def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_others() -> None:
+def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_others():
     robot = judges.load("go2")
     at = robot.standing()
     yawed = judges.rotation([0.0, 0.0, 0.15])
@@ -189,7 +183,7 @@ def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_other
     assert abs(np.arctan2(R.rotation[1, 0], R.rotation[0, 0]) - 0.15) < 0.02
 
 
-def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet() -> None:
+def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet():
     robot, amplitude, rate = judges.load("talos"), 0.02, 12.0  # m, rad/s
     at, contacts = robot.standing(), judges.stance(robot)
     ground = at.com * [1.0, 1.0, 0.0] + [0.0, 0.0, contacts.positions(at)[:, 2].mean()]
@@ -214,7 +208,7 @@ def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet() -> N
     assert error(CentreOfPressureTask(target, weight=1.0)) < 0.3 * without
 
 
-def test_wrong_arguments_are_reported() -> None:
+def test_wrong_arguments_are_reported():
     eye = np.eye(4)
     refused(lambda: RelativePoseTask("base", "base", eye), InputError, "base")
     refused(lambda: RelativePoseTask("base", 1.0, eye), InputError, "reference", 1)

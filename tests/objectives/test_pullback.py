@@ -74,9 +74,7 @@ def least(
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(
-    name: str,
-) -> None:
+def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torques_do(name):
     """Eq. (15) at random torques, with the acceleration from one solution of the whole system."""
     rng = np.random.default_rng(0)
     for seed in (None, 0):
@@ -93,7 +91,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
-def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name: str) -> None:
+def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(name):
     eom = judges.at_rest(name)
     residuals = {"qdd": costs(eom)["qdd"]}
     seen = as_quadratics(residuals)["qdd"].pullback(fb.accelerations_from_torques(eom))
@@ -102,9 +100,7 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
 
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("feet", [1, 4])
-def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(
-    name: str, feet: int
-) -> None:
+def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_everything(name, feet):
     """Eq. (18) with costs on q̈, τ and λ together."""
     eom = judges.at_rest(name, feet=feet)
     residuals = costs(eom)
@@ -117,20 +113,19 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
     ) == pytest.approx(seen(beta), rel=1e-9)
 
 
-def test_costs_may_be_given_on_any_of_the_three_and_add_up() -> None:
+def test_costs_may_be_given_on_any_of_the_three_and_add_up():
     eom = judges.at_rest("go2", feet=3)
     space, parts = dynamics.feasible_space(eom), as_quadratics(costs(eom))
     beta = np.random.default_rng(0).normal(size=space.dimension)
     values = {b: objectives.cost_on_space(space, **{b: parts[b]})(beta) for b in BLOCKS}
     for block, x in zip(BLOCKS, space(beta), strict=True):
         assert values[block] == pytest.approx(parts[block](x), rel=1e-10)
-    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(
-        sum(values.values()), rel=1e-10
-    )
+    expected = sum(values.values())
+    assert objectives.cost_on_space(space, **parts)(beta) == pytest.approx(expected, rel=1e-10)
     assert objectives.cost_on_space(space)(beta) == 0.0
 
 
-def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
+def test_a_cost_on_all_three_at_once_may_couple_them():
     """Eq. (18) for a Q(q̈, τ, λ) that is not a sum of three costs, such as (τ - K q̈)²."""
     eom = judges.at_rest("go2", feet=2)
     space = dynamics.feasible_space(eom)
@@ -138,9 +133,8 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
     A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
     seen = Quadratic.from_residual(A, r).pullback(space.map)
     beta = rng.normal(size=space.dimension)
-    assert seen(beta) == pytest.approx(
-        0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2)), rel=1e-10
-    )
+    expected = 0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2))
+    assert seen(beta) == pytest.approx(expected, rel=1e-10)
 
 
 # (19) ---------------------------------------------------------------------------------------------
@@ -149,9 +143,7 @@ def test_a_cost_on_all_three_at_once_may_couple_them() -> None:
 @pytest.mark.parametrize("name", judges.FLOATING)
 @pytest.mark.parametrize("block", BLOCKS)
 @pytest.mark.parametrize("feet", [1, 2, 4])
-def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
-    name: str, block: str, feet: int
-) -> None:
+def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name, block, feet):
     """Every block, against the minimum with this block fixed and everything else free. The literal
     reading is never lower.
     """
@@ -174,9 +166,7 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(
 
 
 @pytest.mark.parametrize("name", judges.BALLS)
-def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(
-    name: str,
-) -> None:
+def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where_it_does_not(name):
     """V_q̈ has full column rank on one foot, but not on four. On four feet, the literal reading has
     a clearly higher cost.
     """
@@ -195,7 +185,7 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
             assert (smallest(x) == pytest.approx(best(x), rel=1e-7)) == agree
 
 
-def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19() -> None:
+def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19():
     """go2 with a cost on squared friction and a little torque: the smallest β leaves friction that
     the best β removes by internal forces.
     """
@@ -221,7 +211,7 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
 
-def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
+def test_accelerations_that_cannot_change_do_not_determine_beta():
     """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
     β must not contain 1 / rounding.
     """
@@ -238,7 +228,7 @@ def test_where_nothing_can_move_the_block_has_no_say_in_beta() -> None:
     )
 
 
-def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused() -> None:
+def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused():
     """A reward for internal forces has no minimum, and the error says so."""
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
@@ -250,7 +240,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     assert np.isfinite(objectives.minimum_norm_pullback(reward, space, "qdd")(np.zeros(18)))
 
 
-def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> None:
+def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused():
     """A cost with negative curvature has no minimum either: its stationary point is the worst, not
     the best.
     """
@@ -261,7 +251,7 @@ def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused() -> 
         objectives.partial_minimum(hill, space, "qdd")
 
 
-def test_directions_that_cost_nothing_are_left_alone() -> None:
+def test_directions_that_cost_nothing_are_left_alone():
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     free = Quadratic.zero(space.dimension)
@@ -270,7 +260,7 @@ def test_directions_that_cost_nothing_are_left_alone() -> None:
     assert np.allclose(objectives.argmin_coordinates(free, space, "qdd")(x), smallest)
 
 
-def test_weights_ten_orders_apart_do_not_blind_the_best_reading() -> None:
+def test_weights_ten_orders_apart_do_not_blind_the_best_reading():
     """A force cost of 1e-10 beside a torque cost of 1 still decides where the torque cost is
     constant.
 

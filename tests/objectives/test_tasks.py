@@ -31,7 +31,7 @@ def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Gene
     return found
 
 
-def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(name: str) -> None:
+def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(name):
     for eom, qdd, rng in cases(name):
         target, velocity, feed = rng.normal(size=(3, 3))
         task = fb.CoMTask(target, velocity, feed, kp=7.0, kd=3.0)
@@ -41,7 +41,7 @@ def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(na
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name: str) -> None:
+def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name):
     for eom, qdd, rng in cases(name):
         frame = eom.robot.frames[-1]
         target, velocity, feed = rng.normal(size=(3, 3))
@@ -52,9 +52,7 @@ def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name: str) 
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(
-    name: str,
-) -> None:
+def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(name):
     for eom, qdd, rng in cases(name):
         frame = eom.robot.frames[-1]
         R = eom.state.frame_pose(frame).rotation
@@ -76,9 +74,7 @@ def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_o
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=5e-5)
 
 
-def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(
-    name: str,
-) -> None:
+def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(name):
     for eom, qdd, rng in cases(name):
         robot, state = eom.robot, eom.state
         target = robot.random_state(int(rng.integers(1000)), 0.2)
@@ -88,7 +84,7 @@ def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_a
         assert np.allclose(task.residual(eom)(qdd), expected, atol=1e-9)
 
 
-def test_the_posture_of_the_base_does_not_count() -> None:
+def test_the_posture_of_the_base_does_not_count():
     eom = fb.equations_of_motion(judges.load("go2").random_state(0), fb.Contacts.none())
     q = eom.state.q.copy()
     q[:3] += 1.0
@@ -98,7 +94,7 @@ def test_the_posture_of_the_base_does_not_count() -> None:
     assert not np.any(residuals[0].A[:, :6])
 
 
-def test_force_and_torque_residuals_are_actual_minus_target(name: str) -> None:
+def test_force_and_torque_residuals_are_actual_minus_target(name):
     for eom, _, rng in cases(name):
         forces, tau = rng.normal(size=eom.k), rng.normal(size=eom.d)
         assert np.array_equal(fb.ForceTask().residual(eom)(forces), forces)
@@ -107,22 +103,20 @@ def test_force_and_torque_residuals_are_actual_minus_target(name: str) -> None:
         assert np.allclose(fb.TorqueTask(np.ones(eom.d)).residual(eom)(tau), tau - 1.0)
 
 
-def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(name: str) -> None:
+def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(name):
     state = judges.load(name).standing()
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     for task in fb.standing_tasks(state):
         assert np.allclose(task.residual(eom)(np.zeros(eom.nv)), 0.0, atol=1e-9), task.name
 
 
-def test_targets_may_be_functions_of_time() -> None:
+def test_targets_may_be_functions_of_time():
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     p, v, a = [2.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.0, 1.0, 2.0]
-    R, q, w = (
-        judges.rotation([0.0, 0.0, 0.3]),
-        state.integrate(np.full(18, 0.1)),
-        np.linspace(-1.0, 1.0, 12),
-    )
+    R = judges.rotation([0.0, 0.0, 0.3])
+    q = state.integrate(np.full(18, 0.1))
+    w = np.linspace(-1.0, 1.0, 12)
     kinds = [
         (partial(fb.CoMTask, kp=4.0), (p, v, a)),
         (partial(fb.FrameTask, "FL_foot"), (p, v, a)),
@@ -141,7 +135,7 @@ def test_targets_may_be_functions_of_time() -> None:
     assert np.array_equal(rows.residual(eom).b, fb.CoMTask(p, v, a).residual(eom).b)
 
 
-def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> None:
+def test_a_moving_target_is_evaluated_once_a_tick_and_followed_without_lag():
     """A critically damped task lags behind a slow target by (kd / kp) times the target's velocity,
     unless it knows this velocity.
     """
@@ -172,7 +166,7 @@ def test_a_moving_target_is_asked_for_once_a_tick_and_followed_without_lag() -> 
     assert len(asked) == len(set(asked))
 
 
-def test_damping_is_critical_unless_it_is_given() -> None:
+def test_damping_is_critical_unless_it_is_given():
     """ë + kd ė + kp e = 0 with kd = 2 √kp has the double root -√kp, the fastest return without
     overshoot.
     """
@@ -188,7 +182,7 @@ def test_damping_is_critical_unless_it_is_given() -> None:
         assert not np.allclose(make(kp=25.0).residual(eom).b, make(kp=25.0, kd=0.0).residual(eom).b)
 
 
-def test_a_target_is_copied_when_a_task_is_made() -> None:
+def test_a_target_is_copied_when_a_task_is_made():
     state = judges.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.none())
     target = state.com.copy()
@@ -202,22 +196,20 @@ def test_a_target_is_copied_when_a_task_is_made() -> None:
     assert np.array_equal(hold.residual(eom)(np.zeros(12)), np.zeros(12))
 
 
-def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_still() -> None:
+def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_still():
     """The target is 30 mm to the left. For solo8, whose legs cannot lean sideways, it is 20 mm
     back.
     """
     wrong = []
-    for name in judges.FLOATING:
+    for name in ("go2", "solo8", "talos"):
         robot = judges.load(name)
         standing = robot.standing()
         target = standing.com + ([-0.02, 0.0, 0.0] if name == "solo8" else [0.0, 0.03, 0.0])
         tasks = [fb.CoMTask(target), *fb.standing_tasks(standing)[1:]]
         controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
         run = fb.rollout(fb.Simulation(robot), controller, 2.5, control_period=2e-3)
-        left, speed = (
-            1e3 * float(np.linalg.norm(target - run.com[-1])),
-            float(np.abs(run.final.v).max()),
-        )
+        left = 1e3 * float(np.linalg.norm(target - run.com[-1]))
+        speed = float(np.abs(run.final.v).max())
         wrong += (
             []
             if left < 1.0 and speed < STILL
@@ -226,7 +218,7 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
     assert wrong == []
 
 
-def test_standing_tasks_keep_the_arms_where_they_were() -> None:
+def test_standing_tasks_keep_the_arms_where_they_were():
     """Only the posture task holds joints that no contact needs, against gravity and a push."""
     for name, part in (("anymal_kinova", "j2s6s200"), ("talos", "arm"), ("ur5", "")):
         robot = judges.load(name)

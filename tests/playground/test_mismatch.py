@@ -38,7 +38,7 @@ def solved(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mass_and_the_parts_of_h_are_those_of_another_model(seed: int) -> None:
+def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed: int) -> None:
     state = moving(seed)
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     heavy, data = state.robot.model.copy(), state.robot.model.createData()
@@ -78,7 +78,7 @@ def test_the_default_is_exact_and_changes_nothing() -> None:
     assert not ModelMismatch(drift=False).is_exact
 
 
-def test_without_drift_the_plan_keeps_a_qdd_zero() -> None:
+def test_a_plan_without_drift_has_zero_a_qdd() -> None:
     eom, x = solved(ModelMismatch(drift=False), moving())
     assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
     assert np.abs(eom.b).max() > 0.1  # m/s²: the neglected drift
@@ -94,7 +94,7 @@ def test_an_ignored_contact_exerts_no_force_in_the_plan() -> None:
     )
 
 
-def test_without_the_zeros_of_s_only_the_joint_rows_hold() -> None:
+def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows() -> None:
     eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
@@ -103,7 +103,7 @@ def test_without_the_zeros_of_s_only_the_joint_rows_hold() -> None:
     )
 
 
-def test_without_cones_feet_pull() -> None:
+def test_feet_pull_in_a_plan_without_cones() -> None:
     robot, down = judges.load("go2"), np.array([0.0, 0.0, -30.0])
     state, contacts = robot.standing(), judges.stance(robot)
     tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
@@ -135,7 +135,7 @@ def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
 
 
-def test_a_name_given_alone_is_refused_with_the_list_to_give() -> None:
+def test_a_single_name_is_refused_and_the_error_shows_a_list() -> None:
     refused(
         lambda: ModelMismatch(ignored_contacts="FR_foot"),
         InputError,

@@ -32,7 +32,7 @@ def in_the_air(sim: PerturbedSimulation, omega: float = 0.0) -> None:
     sim.reset(state.replace(q=q, v=v))
 
 
-def test_without_perturbation_it_equals_the_simulation() -> None:
+def test_an_unperturbed_simulation_equals_the_plain_one() -> None:
     plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
@@ -69,7 +69,7 @@ def test_a_disabled_contact_carries_nothing() -> None:
     assert record.measured.reshape(len(record), -1, 3)[-1, 1:].any()
 
 
-def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
+def test_a_spinning_robot_keeps_its_velocity_without_velocity_forces() -> None:
     """Without gravity, torques and velocity forces, all velocities are constant."""
     change = {}
     for kept in (True, False):
@@ -85,7 +85,7 @@ def test_without_velocity_forces_a_spinning_robot_keeps_its_velocity() -> None:
     assert change[True] > 0.05
 
 
-def test_without_velocity_forces_the_base_keeps_its_velocity_along_its_own_axes() -> None:
+def test_a_base_keeps_its_velocity_along_its_own_axes_without_velocity_forces() -> None:
     """With M q̈ = 0 in the base's own axes, a rotating base flies along a curve."""
     sim = PerturbedSimulation(
         GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False)

@@ -16,6 +16,7 @@ from messages import raises
 import floatbase as fb
 from floatbase.behaviours import Gait
 from floatbase.errors import FloatbaseError, InputError
+from floatbase.live.settings import SETTINGS
 from floatbase.playground import (
     PERIOD,
     BaseMotors,
@@ -39,10 +40,10 @@ EACH = {
     "another quadratic program": Settings(
         weights=(2.0, 10.0, 0.1), torque_fraction=0.8, min_normal_force=5.0
     ),
-    "it nods": Settings(nod=0.2),
     "it trots": Settings(gait="trot", velocity=(0.2, 0.05, 0.1), friction=(0.6, 0.8)),
-    "it steps": Settings(steps_when_pushed=True),
-    "terms off": Settings(assumed_off=("velocity", "drift", "cones"), actual_off=("velocity",)),
+    "terms off": Settings(
+        assumed_off=("velocity", "gravity", "drift", "cones"), actual_off=("velocity", "gravity")
+    ),
     "motors of the base": Settings(assumed_off=("zeros",), actual_off=("zeros",)),
     "a leg ignored": Settings(assumed_off=("forces",), actual_off=("forces",), leg="FR_foot"),
     "it crawls with a mismatch": Settings(
@@ -53,8 +54,6 @@ EACH = {
     "motors of a lighter base": Settings(
         assumed_off=("gravity", "velocity"), actual_off=("zeros",), mass=(1.3, 1.0)
     ),
-    "on two feet": Settings(com_shift=(-0.02, 0.0, 0.0), lifted_feet=("FR_foot", "RL_foot")),
-    "no gravity": Settings(assumed_off=("gravity",), actual_off=("gravity",)),
 }
 SECONDS = 1.0  # of the program's three: the push is over, a trot is under way
 
@@ -98,7 +97,7 @@ def test_the_program_of_an_arm_and_of_a_biped_makes_the_same_run(name: str) -> N
 @pytest.mark.parametrize(
     "names", [("it's", 'a "quoted" \\ foot'), ("__import__('os')", "'); 1/0; ('")]
 )
-def test_names_of_feet_are_quoted_in_the_program(
+def test_the_program_quotes_the_names_of_feet(
     names: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The robot comes from a file in which the feet have unusual names."""
@@ -232,22 +231,6 @@ def test_motors_of_the_base_act_only_if_the_controller_assumes_them() -> None:
     assert used[()] < 1e-6 * GO2.weight < 0.5 * GO2.weight < used[("zeros",)]
 
 
-def test_gravity_has_no_arrow_when_it_is_switched_off() -> None:
-    session = Session(GO2)
-    record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
-    assert list(term_arrows("gravity", record, 1e-3, 0.4)) == [
-        "term gravity/m g",
-        "term gravity/m g label",
-    ]
-    (word,) = term_arrows("gravity", record, 1e-3, 0.4, ("gravity",)).values()
-    assert word.shape.name == "m g: switched off"
-    (word,) = term_arrows("velocity", record, 1e-3, 0.4).values()
-    assert word.shape.name == "C q̇ ≈ 0"
-    assert term_arrows("zeros", record, 1e-2, 0.4, ("zeros",)), (
-        "there are torques with motors of the base, too"
-    )
-
-
 def test_arrows_have_the_actual_mass() -> None:
     session = Session(GO2, Settings(mass=(1.0, 1.5)))
     record = fb.rollout(session.sim, session.controller, 0.02, control_period=4e-3)
@@ -315,6 +298,42 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
         )
     finally:
         playground.close()
+
+
+def shown_control(playground: Playground, key: str, column: str = "") -> dict[str, Any]:
+    """The command of a control; key: of the table of settings."""
+    name = f"{SETTINGS[key].label} {column}".strip()
+    command = playground.view.window.scene.command(("/", "set_control", name))
+    assert command is not None, f"there is no control {name!r}"
+    return command
+
+
+def test_controls_have_the_words_and_ranges_of_the_table_of_settings() -> None:
+    """Their first values are those of `Settings`, in the units of the table."""
+    pairs = ("friction", "slope", "mass", "bandwidth")
+    others = (
+        "com_x", "com_y", "com_z", "nodding", "velocity_x", "velocity_y", "yaw_rate", "facets",
+        "torque_limits", "normal_force", "motion_weight", "posture_weight", "effort_weight",
+    )  # fmt: skip
+    with closing(Playground(GO2)) as playground:
+        for key in (*pairs, *others):
+            for column in ("model", "reality") if key in pairs else ("",):
+                made, setting = shown_control(playground, key, column), SETTINGS[key]
+                assert made["value"] == setting.first, key
+                assert (made["min"], made["max"]) == (setting.low, setting.high), key
+                assert (made["step"], made["section"]) == (setting.step, setting.section), key
+
+
+def test_sliders_show_settings_in_the_units_of_the_table() -> None:
+    settings = Settings(
+        mass=(1.0, 1.5), com_shift=(0.04, 0.0, -0.5), torque_fraction=0.55, weights=(1.0, 10.0, 1.0)
+    )
+    with closing(Playground(GO2, settings)) as playground:
+        assert shown_control(playground, "mass", "reality")["value"] == 150
+        assert shown_control(playground, "com_x")["value"] == 4
+        assert shown_control(playground, "com_z")["value"] == -8  # the end of the slider
+        assert shown_control(playground, "torque_limits")["value"] == 55
+        assert shown_control(playground, "posture_weight")["value"] == 1
 
 
 def test_a_speed_that_the_legs_cannot_reach_is_shown() -> None:

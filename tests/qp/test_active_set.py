@@ -73,25 +73,24 @@ def check_record(run: ActiveSetRun) -> None:
 # the course text's table --------------------------------------------------------------------------
 
 
-def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there() -> None:
+def test_a_minimum_above_the_table_makes_the_row_inactive_and_it_might_not_be_there():
     run = active_set(table_top(minimum=(0.5, 1.0)))
     assert np.allclose(run.solution.x, [0.5, 1.0])
     assert run.solution.active == () == run.working_set
 
 
-def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality() -> None:
+def test_a_minimum_below_the_table_makes_the_row_active_and_it_might_be_an_equality():
     qp = table_top(minimum=(0.5, -1.0))
     found = active_set(qp).solution
     equality = solve(QP(qp.H, qp.g, qp.G, qp.h, np.zeros((0, 2)), np.zeros(0)))
     assert found.active == ("table",)
     assert np.allclose(found.x, [0.5, 0.0])
     assert np.allclose(found.x, equality.x)
-    assert found.multipliers["table"] == pytest.approx(
-        1.0
-    )  # the minimum lies 1 m below, at curvature 1
+    # the minimum lies 1 m below, at curvature 1
+    assert found.multipliers["table"] == pytest.approx(1.0)
 
 
-def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> None:
+def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it():
     first, second = active_set(table_top((0.5, -1.0)), start=(0.0, 1.0)).iterations
     assert (first.working_set, first.blocking, first.step_length) == ((), "table", 0.5)
     assert np.allclose(first.direction, [0.5, -2.0])
@@ -101,7 +100,7 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it() -> No
     assert second.multipliers == {"table": pytest.approx(1.0)} and second.dropped is None
 
 
-def test_a_row_that_would_have_to_pull_is_dropped() -> None:
+def test_a_row_that_would_have_to_pull_is_dropped():
     first, second = active_set(
         table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]
     ).iterations
@@ -110,7 +109,7 @@ def test_a_row_that_would_have_to_pull_is_dropped() -> None:
     assert np.allclose(second.x_next, [0.5, 1.0])
 
 
-def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised() -> None:
+def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised():
     run = active_set(table_top((0.5, -1.0)), start=(0.0, -3.0))
     assert run.phase_one[0].objective == pytest.approx(3.0)  # the largest violation, m
     assert np.allclose(run.iterations[0].x, [0.0, 0.0])
@@ -121,7 +120,7 @@ def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised(
 # stopped before the end ---------------------------------------------------------------------------
 
 
-def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so() -> None:
+def test_a_stopped_run_equals_the_beginning_of_the_whole_run_and_has_not_converged():
     for qp in [*controller_qps("go2", 4, torque=0.3), table_top()]:
         whole = active_set(qp)
         rounds = [*whole.phase_one, *whole.iterations]
@@ -134,7 +133,7 @@ def test_a_run_that_is_stopped_has_come_as_far_as_the_whole_run_had_and_says_so(
             assert run.converged or not np.any(run.solution.inequality_multipliers)
 
 
-def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may() -> None:
+def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may():
     seen = set()
     for qp in controller_qps("go2", 6, torque=0.3):
         whole = active_set(qp)
@@ -148,7 +147,7 @@ def test_a_run_stopped_beyond_phase_1_breaks_no_row_and_one_stopped_before_may()
     assert {(True, False), (False, True)} <= seen
 
 
-def test_a_stopped_run_can_be_taken_up_again_where_it_ended() -> None:
+def test_a_stopped_run_can_be_taken_up_again_where_it_ended():
     for qp in controller_qps("go2", 6, torque=0.3):
         run = active_set(qp, max_iterations=1)
         for _ in range(60):
@@ -178,7 +177,7 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_an_honest_way(name: str) -> None:
+def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_its_iterations(name):
     active, infeasible = "", 0
     for qp in controller_qps(name, 20, torque=0.3):
         try:
@@ -220,7 +219,7 @@ def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
 
 
 @pytest.mark.parametrize(("name", "ticks"), [("go2", 50), ("talos", 8)])
-def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks: int) -> None:
+def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name, ticks):
     cold, warm, last = [], [], None
     for qp in swaying_qps(name, ticks):
         run = active_set(qp)
@@ -236,7 +235,7 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name: str, ticks
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name: str) -> None:
+def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name):
     robot = judges.load(name)
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
     controller = fb.WholeBodyController(
@@ -252,34 +251,22 @@ def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(
 
 CORNER = [[1, 0], [0, 1], [1, 1], [2, 1], [1, 2], [1, 0]]  # six rows through one point of the plane
 
+TURN = np.linspace(0, 2 * np.pi, 64, endpoint=False)
+CONE = np.column_stack([np.cos(TURN), np.sin(TURN), np.full(64, -0.7)])
+WALLS, REPEATED = [[-1, 0], [0, -1], [1, 1]], [[1, 1], [1, 1], [2, 2]]
 DEGENERATE = {
     "duplicate rows": problem(np.eye(2), [-3, -1], [[1, 0], [1, 0], [2, 0], [1, 0]], [1, 1, 2, 1]),
     "dependent rows": problem(np.eye(2), [-3, -3], [[1, 0], [0, 1], [1, 1]], [1, 1, 2]),
     "a vertex of more rows than variables": problem(np.eye(2), [-5, -4], CORNER, np.zeros(6)),
-    "a cone of 64 facets, pushed into its tip": problem(
-        np.eye(3),
-        [0, 0, 1],
-        [[np.cos(a), np.sin(a), -0.7] for a in np.linspace(0, 2 * np.pi, 64, endpoint=False)],
-        np.zeros(64),
-    ),
+    "a cone of 64 facets, pushed into its tip": problem(np.eye(3), [0, 0, 1], CONE, np.zeros(64)),
     "a single point": problem(np.eye(2), [1, 2], BOX, [1, 1, -1, -1]),
-    "a single point between three walls": problem(
-        np.eye(2), [1, 2], [[-1, 0], [0, -1], [1, 1]], [-1, -1, 2]
-    ),
-    "a single point left by the equalities": problem(
-        np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]
-    ),
+    "a single point between three walls": problem(np.eye(2), [1, 2], WALLS, [-1, -1, 2]),
+    "a point of two equalities": problem(np.eye(2), [1, 2], [[1, 0]], [1], np.eye(2), [1, 1]),
     "an equality written as two rows": problem(np.eye(2), [-3, -1], [[1, 1], [-1, -1]], [1, -1]),
-    "equalities that repeat": problem(
-        np.eye(2), [1, 2], -np.eye(2), [0, 0], [[1, 1], [1, 1], [2, 2]], [1, 1, 2]
-    ),
-    "a row that the equalities decide": problem(
-        np.eye(3), [1, 2, 3], [[1, 1, 1]], [1], [[1, 1, 1]], [1]
-    ),
+    "repeated equalities": problem(np.eye(2), [1, 2], -np.eye(2), [0, 0], REPEATED, [1, 1, 2]),
+    "a row that is an equality": problem(np.eye(2), [1, 2], [[1, 1]], [1], [[1, 1]], [1]),
     "a row of zeros": problem(np.eye(2), [1, 2], [[0, 0], [1, 0]], [0, -2]),
-    "the same table in other units": problem(
-        np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]
-    ),
+    "a table in other units": problem(np.eye(2), [-3, -1], [[1e6, 0], [1e-6, 0]], [1e6, 1e-6]),
     "a weakly active row": problem(np.eye(2), [-1, 0], [[1, 0], [0, -1]], [1, 0]),
     "no curvature, a box": problem(np.zeros((2, 2)), [1, -2], BOX, np.ones(4)),
     "no curvature along one axis": problem(np.diag([1.0, 0.0]), [1, -2], [[1, 1]], [3]),
@@ -290,19 +277,18 @@ DEGENERATE = {
 
 @pytest.mark.parametrize("name", DEGENERATE)
 @pytest.mark.parametrize("start", [None, (0.0, 0.0, 0.0), (7.0, -5.0, 3.0)])
-def test_degenerate_problems_end_at_the_optimum(name: str, start: tuple[float, ...] | None) -> None:
+def test_degenerate_problems_end_at_the_optimum(name, start):
     qp = DEGENERATE[name]
     run = active_set(qp, None if start is None else start[: qp.n])
     check_optimum(run)
     check_record(run)
     assert run.solution.objective == pytest.approx(solve(qp, "cvxpy").objective, abs=1e-6)
-    again = active_set(
-        qp, run.solution.x, qp.inequality_names
-    )  # every row at once: dependent ones are left out
+    # every row at once: dependent ones are left out
+    again = active_set(qp, run.solution.x, qp.inequality_names)
     assert np.allclose(again.solution.objective, run.solution.objective)
 
 
-def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None:
+def test_beales_cycling_example_terminates():
     """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back
     to its start.
     """
@@ -333,7 +319,7 @@ def test_beales_linear_program_that_makes_careless_pivoting_cycle_ends() -> None
         problem(np.eye(2), [1, 2], [[1, 0], [-1, 0]], [1, -1 - 1e-6]),
     ],
 )
-def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP) -> None:
+def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp):
     for start in (None, (0.0, 0.0), (50.0, -20.0)):
         with pytest.raises(InfeasibleError) as caught:
             active_set(qp, start)
@@ -342,7 +328,7 @@ def test_infeasible_problems_end_with_a_smallest_set_of_rows_in_conflict(qp: QP)
         solve(qp, "active_set")
 
 
-def test_curvature_only_counts_where_the_equalities_hold() -> None:
+def test_curvature_only_counts_where_the_equalities_hold():
     found = active_set(problem(np.diag([1.0, -1.0]), [-2, 0], (), (), [[0, 1]], [3])).solution
     assert np.allclose(found.x, [2.0, 3.0])
 
@@ -361,12 +347,10 @@ def random_qp(seed: int) -> QP:
     def whole(*shape: int) -> Array:
         return rng.integers(-2, 3, shape).astype(np.float64)
 
-    root, G, A, inside = (
-        whole(int(rng.integers(0, n + 1)), n),
-        whole(rows, n),
-        whole(equalities, n),
-        whole(n),
-    )
+    root = whole(int(rng.integers(0, n + 1)), n)
+    G = whole(rows, n)
+    A = whole(equalities, n)
+    inside = whole(n)
     h = whole(rows) if rng.random() < 0.3 else G @ inside + rng.integers(0, 2, rows)
     return QP(root.T @ root, whole(n), A, A @ inside, G, h)
 
@@ -378,21 +362,14 @@ def verdict(qp: QP) -> str:
     if not judges.is_feasible(qp, list(range(len(qp.G)))):
         return "infeasible"
     flat = np.vstack([qp.H, qp.A])
-    falls = linprog(
-        qp.g,
-        qp.G,
-        np.zeros(len(qp.G)),
-        flat,
-        np.zeros(len(flat)),
-        bounds=(-1.0, 1.0),
-        method="highs",
-    )
+    none, still = np.zeros(len(qp.G)), np.zeros(len(flat))
+    falls = linprog(qp.g, qp.G, none, flat, still, bounds=(-1.0, 1.0), method="highs")
     return "unbounded" if falls.fun < -1e-9 else "optimal"
 
 
 @given(st.integers(0, 10**9))
-@hypothesis_settings(max_examples=150)
-def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: int) -> None:
+@hypothesis_settings(max_examples=60)
+def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed):
     qp, expected = random_qp(seed), verdict(random_qp(seed))
     try:
         run = active_set(qp)
@@ -408,8 +385,8 @@ def test_random_problems_end_with_the_verdict_that_linear_programs_give(seed: in
 
 
 @given(st.integers(0, 10**9), st.integers(0, 10**9))
-@hypothesis_settings(max_examples=80)
-def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, other: int) -> None:
+@hypothesis_settings(max_examples=40)
+def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed, other):
     qp, rng = random_qp(seed), np.random.default_rng(other)
     if verdict(qp) != "optimal":
         return
@@ -417,12 +394,5 @@ def test_any_start_and_any_working_rows_lead_to_the_same_optimum(seed: int, othe
     run = active_set(qp, 3.0 * rng.normal(size=qp.n), working)
     check_optimum(run)
     check_record(run)
-    assert run.solution.objective == pytest.approx(
-        active_set(qp).solution.objective, rel=1e-8, abs=1e-8
-    )
-
-
-def test_a_run_is_a_value() -> None:
-    run = active_set(table_top())
-    assert not run.iterations[0].x.flags.writeable
-    assert not run.solution.x.flags.writeable
+    expected = active_set(qp).solution.objective
+    assert run.solution.objective == pytest.approx(expected, rel=1e-8, abs=1e-8)

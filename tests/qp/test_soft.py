@@ -29,7 +29,7 @@ def random_problem(rng: np.random.Generator, n: int = 8, rows: int = 12, soft: i
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_the_minimizer_is_that_of_the_objective_with_penalties(solver: str) -> None:
+def test_the_minimizer_is_that_of_the_objective_with_penalties(solver):
     rng, n_violated = np.random.default_rng(0), 0
     for _ in range(15):
         qp = random_problem(rng)
@@ -52,7 +52,7 @@ def test_the_minimizer_is_that_of_the_objective_with_penalties(solver: str) -> N
     assert n_violated > 3
 
 
-def test_a_penalty_is_exact() -> None:
+def test_a_penalty_is_exact():
     """min ½ x² - 3 x with x ≤ 1 has the multiplier 2: the row holds for w > 2, and not below."""
     hard = QP(np.eye(1), [-3.0], np.zeros((0, 1)), [], [[1.0]], [1.0], inequality_names=["wall"])
     for weight, x in ((10.0, 1.0), (2.5, 1.0), (1.5, 1.5), (1e-3, 2.999)):
@@ -66,7 +66,7 @@ def test_a_penalty_is_exact() -> None:
         assert active_set(soft).solution.x == pytest.approx([1.0])
 
 
-def test_a_large_weight_leaves_the_least_weighted_violation() -> None:
+def test_a_large_weight_leaves_the_least_weighted_violation():
     rng = np.random.default_rng(1)
     for _ in range(10):
         qp = random_problem(rng)
@@ -86,7 +86,7 @@ def test_a_large_weight_leaves_the_least_weighted_violation() -> None:
         assert shares @ excess == pytest.approx(least.fun, abs=1e-6)
 
 
-def test_only_hard_rows_can_be_in_conflict() -> None:
+def test_only_hard_rows_can_be_in_conflict():
     rows = np.array([[1.0], [-1.0], [-1.0]])
     names = ["at most 0", "at least 1", "at least 2"]
     qp = QP(np.eye(1), [0.0], np.zeros((0, 1)), [], rows, [0.0, -1.0, -2.0], inequality_names=names)
@@ -98,7 +98,7 @@ def test_only_hard_rows_can_be_in_conflict() -> None:
 
 
 @pytest.mark.parametrize("penalties", [[1.0], [0.0, 1.0, 1.0], [-1.0] * 3, [np.nan] * 3, "abc", 5])
-def test_penalties_are_positive_numbers_one_for_each_row(penalties: object) -> None:
+def test_penalties_are_positive_numbers_one_for_each_row(penalties):
     rows = np.ones((3, 1))
     with raises(InputError, "penalties"):
         QP(np.eye(1), [0.0], np.zeros((0, 1)), [], rows, np.zeros(3), penalties=penalties)

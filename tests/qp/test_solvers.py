@@ -38,7 +38,7 @@ def corner(scale: float = 1.0, row_scale: float = 1.0, equality_scale: float = 1
 
 @pytest.mark.parametrize("solver", solvers())
 @pytest.mark.parametrize("scale", [1e-9, 1e-4, 1.0, 1e4, 1e9])
-def test_the_unit_of_the_objective_changes_multipliers_only(solver: str, scale: float) -> None:
+def test_the_unit_of_the_objective_changes_multipliers_only(solver, scale):
     found = solve(corner(scale=scale), solver)
     assert np.allclose(found.x, [1.0, 0.5, 1.0], atol=1e-6)
     assert np.allclose(found.inequality_multipliers, scale * np.array([3.0, 0.5]), rtol=1e-5)
@@ -48,7 +48,7 @@ def test_the_unit_of_the_objective_changes_multipliers_only(solver: str, scale: 
 
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("row_scale", [1e-6, 1e-3, 1e3, 1e6])
-def test_the_unit_of_a_row_changes_its_multiplier_only(solver: str, row_scale: float) -> None:
+def test_the_unit_of_a_row_changes_its_multiplier_only(solver, row_scale):
     found = solve(corner(row_scale=row_scale), solver)
     assert np.allclose(found.x, [1.0, 0.5, 1.0])
     assert np.allclose(found.inequality_multipliers * row_scale, [3.0, 0.5])
@@ -57,26 +57,18 @@ def test_the_unit_of_a_row_changes_its_multiplier_only(solver: str, row_scale: f
 
 @pytest.mark.parametrize("solver", solvers())
 @pytest.mark.parametrize("equality_scale", [1e-12, 1e12])
-def test_the_unit_of_an_equation_does_not_make_it_disappear(
-    solver: str, equality_scale: float
-) -> None:
+def test_the_unit_of_an_equation_does_not_make_it_disappear(solver, equality_scale):
     """An equation in units of 1e-12 beside one in units of 1 must not count as one of rank 0."""
     small = corner(equality_scale=equality_scale)
-    qp = QP(
-        small.H,
-        small.g,
-        np.vstack([small.A, [0.0, 1.0, 0.0]]),
-        np.append(small.b, 0.75),
-        small.G,
-        small.h,
-    )
+    A, b = np.vstack([small.A, [0.0, 1.0, 0.0]]), np.append(small.b, 0.75)
+    qp = QP(small.H, small.g, A, b, small.G, small.h)
     assert qp.equality_space.n_in == 1
     found = solve(qp, solver)
     assert np.allclose(found.x, [1.0, 0.75, 1.0], atol=1e-6)
     assert found.residuals.stationarity < 1e-5
 
 
-def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> None:
+def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities():
     qp = judges_qp("go2", 1)
     space, inner = qp.equality_space, qp.reduced
     assert inner.n == space.n_in and inner.inequality_names == qp.inequality_names
@@ -88,10 +80,9 @@ def test_the_reduced_problem_is_the_problem_on_the_space_of_its_equalities() -> 
     assert np.allclose(space(solve(alone).x), solve(qp).x, atol=1e-9)
 
 
-def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding() -> None:
-    u = np.array(
-        [2.0, -1.0, 1.0]
-    )  # H, g and the row all look along the direction that the equality fixes
+def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding():
+    # H, g and the row all look along the direction that the equality fixes
+    u = np.array([2.0, -1.0, 1.0])
     qp = QP(
         1e4 * np.outer(u, u), 3.0 * u, u[None], np.array([-3.0]), 7.0 * u[None], np.array([-21.0])
     )
@@ -112,7 +103,7 @@ def judges_qp(name: str, seed: int) -> QP:
 
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
-def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
+def test_every_solver_gives_the_controller_the_same_torques(name):
     for seed in range(3):
         qp = judges_qp(name, seed)
         reference = solve(qp, "active_set")
@@ -139,12 +130,12 @@ def test_every_solver_gives_the_controller_the_same_torques(name: str) -> None:
         QP(np.diag([1.0, 0.0]), [0.0, -1.0], *NONE, [[1.0, -1.0], [-1.0, -1.0]], [0.0, 0.0]),
     ],
 )
-def test_every_solver_calls_an_objective_that_falls_for_ever_just_that(solver: str, qp: QP) -> None:
+def test_every_solver_refuses_an_unbounded_objective(solver, qp):
     refused(lambda: solve(qp, solver), SolverError)
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver: str) -> None:
+def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver):
     box = np.vstack([np.eye(2), -np.eye(2)])
     with raises(SolverError, "H", -1):
         solve(QP(np.diag([1.0, -1.0]), [1.0, 0.0], *NONE, box, np.ones(4)), solver)
@@ -152,7 +143,7 @@ def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver
 
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("gap", [1e-8, 1e-6, 1e-2, 1e4])
-def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, gap: float) -> None:
+def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver, gap):
     qp = QP(
         np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0]
     )
@@ -162,7 +153,7 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver: str, ga
 
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
-def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str) -> None:
+def test_an_infeasible_controller_names_a_smallest_set_of_rows(name):
     """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says,
     never anything else.
     """
@@ -170,19 +161,11 @@ def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str
     verdicts = []
     for seed in range(8):
         limits = 10.0 ** rng.uniform(-2.0, -0.5) * robot.torque_limits
-        contacts, tasks = (
-            judges.stance(robot, rng.choice([0.2, 0.7])),
-            fb.standing_tasks(robot.standing()),
-        )
+        contacts = judges.stance(robot, rng.choice([0.2, 0.7]))
+        tasks = fb.standing_tasks(robot.standing())
         press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
-        controller = fb.WholeBodyController(
-            robot,
-            contacts,
-            tasks,
-            torque_limits=limits,
-            min_normal_force=press,
-            backend="reference",
-        )
+        options = {"torque_limits": limits, "min_normal_force": press, "backend": "reference"}
+        controller = fb.WholeBodyController(robot, contacts, tasks, **options)
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             solve(qp)
@@ -196,35 +179,27 @@ def test_controllers_that_ask_too_much_are_told_a_smallest_set_of_rows(name: str
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_rows_that_only_just_meet_leave_a_point(solver: str) -> None:
+def test_rows_that_only_just_meet_leave_a_point(solver):
     found = solve(QP(np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0]], [1.0, -1.0]), solver)
     assert np.allclose(found.x, [1.0, -2.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6, 1e10])
-def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: float) -> None:
+def test_rows_through_one_point_leave_it_whatever_its_unit(solver, scale):
     """One row is minus a sum of others that it meets at a point: feasible in real numbers, and but
     for rounding in these.
     """
     for seed in range(20):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(2, 8))
-        point, meeting, G = (
-            scale * rng.normal(size=n),
-            int(rng.integers(1, n)),
-            rng.normal(size=(2 * n, n)),
-        )
+        point = scale * rng.normal(size=n)
+        meeting = int(rng.integers(1, n))
+        G = rng.normal(size=(2 * n, n))
         h = G @ point + scale * np.where(np.arange(2 * n) < meeting, 0.0, rng.uniform(size=2 * n))
         G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
-        qp = QP(
-            np.eye(n),
-            scale * rng.normal(size=n),
-            np.zeros((0, n)),
-            [],
-            G,
-            np.append(h, G[-1] @ point),
-        )
+        h = np.append(h, G[-1] @ point)
+        qp = QP(np.eye(n), scale * rng.normal(size=n), np.zeros((0, n)), [], G, h)
         assert solve(qp, solver).residuals.inequality <= 10.0 * (
             FEASIBILITY_TOLERANCE + 1e-12 * scale
         ), seed
@@ -232,7 +207,7 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver: str, scale: f
 
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("slope", 10.0 ** -np.arange(2.0, 16.0))
-def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver: str, slope: float) -> None:
+def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver, slope):
     """x ≤ -1 and slope y ≤ x: nearly parallel rows, which meet at y = -1 / slope."""
     try:
         found = solve(
@@ -245,14 +220,14 @@ def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver: str, slop
 
 
 @pytest.mark.parametrize("slope", [1e-11, 1e-13])
-def test_equalities_that_nearly_repeat_each_other_are_named(slope: float) -> None:
+def test_equalities_that_nearly_repeat_each_other_are_named(slope):
     with pytest.raises(InfeasibleError) as caught:
         solve(QP(np.eye(2), np.zeros(2), [[1.0, 0.0], [1.0, slope]], [0.0, 1.0], *NONE))
     assert caught.value.constraints == ("equality 0", "equality 1")
 
 
 @pytest.mark.parametrize("solver", solvers())
-def test_inconsistent_equalities_are_named_by_a_smallest_set(solver: str) -> None:
+def test_inconsistent_equalities_are_named_by_a_smallest_set(solver):
     A = np.array([[1.0, 0.0], [1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [0.0, 3.0]])
     names = ("x is 1", "sum is 3", "x is 1.5", "y is 2", "y is 2 again")
     qp = QP(np.eye(2), np.zeros(2), A, [1.0, 3.0, 3.0, 2.0, 6.0], *NONE, equality_names=names)
@@ -307,7 +282,8 @@ def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
     )
 
 
-def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method() -> None:
+@pytest.mark.front_end
+def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method():
     """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H
     run from 1e-11 to 20.
     """
@@ -326,7 +302,7 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method() 
     )
 
 
-def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -> None:
+def test_small_force_weights_do_not_make_a_problem_infeasible():
     """DAQP calls these problems infeasible: weights from 1e-9 to 100, feet that must press. The
     truth is a linear program's.
     """
@@ -344,14 +320,8 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         if seed >= 10 and "active_set" in answered:
             break
         press = share * robot.weight  # at every foot
-        controller = fb.WholeBodyController(
-            robot,
-            judges.stance(robot),
-            tasks,
-            min_normal_force=press,
-            backend="reference",
-            joint_limits=None,
-        )
+        options = {"min_normal_force": press, "backend": "reference", "joint_limits": None}
+        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, **options)
         qp = controller.qp(robot.random_state(seed, 0.3))
         try:
             found = solve(qp)
@@ -362,25 +332,18 @@ def test_forces_that_cost_next_to_nothing_are_not_taken_for_rows_in_conflict() -
         assert judges.is_feasible(qp, list(range(len(qp.G))))
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         slopes = (qp.H @ found.x, qp.g, qp.A.T @ found.equality_multipliers)
-        steepest, flattest = (
-            max(np.max(np.abs(slope)) for slope in slopes),
-            np.linalg.eigvalsh(qp.reduced.H)[0],
-        )
+        steepest = max(np.max(np.abs(slope)) for slope in slopes)
+        flattest = np.linalg.eigvalsh(qp.reduced.H)[0]
         assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
     assert "active_set" in answered, (
         "DAQP managed: these states no longer try what this test is about"
     )
 
 
-def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "cvxpy", None)  # as if it were not installed
     assert "cvxpy" not in solvers()
     refused(lambda: solve(corner(), "cvxpy"), MissingDependencyError, "cvxpy", "floatbase[cvxpy]")
     robot = judges.load("go2")
-    refused(
-        lambda: fb.WholeBodyController(robot, judges.stance(robot), [], solver="cvxpy"),
-        MissingDependencyError,
-        "floatbase[cvxpy]",
-    )
+    with raises(MissingDependencyError, "floatbase[cvxpy]"):
+        fb.WholeBodyController(robot, judges.stance(robot), [], solver="cvxpy")

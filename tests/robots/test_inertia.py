@@ -21,7 +21,7 @@ ROUNDING = 1e-12  # relative
 
 
 @pytest.mark.parametrize(("name", "frame"), CASES)
-def test_a_payload_is_a_point_mass_for_pinocchio_and_mujoco(name: str, frame: str) -> None:
+def test_a_payload_is_a_point_mass_for_pinocchio_and_mujoco(name, frame):
     robot, mass, position = judges.load(name), 2.5, [0.1, -0.05, 0.2]
     if frame not in robot.frames and frame != "base":
         frame = robot.frames[-1]
@@ -43,7 +43,7 @@ def test_a_payload_is_a_point_mass_for_pinocchio_and_mujoco(name: str, frame: st
 
 
 @pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_scaled_masses_scale_inertia_and_forces(name: str) -> None:
+def test_scaled_masses_scale_inertia_and_forces(name):
     robot = judges.load(name)
     heavy = robot.with_scaled_mass(1.3)
     for state in judges.states(name, 2):
@@ -54,7 +54,7 @@ def test_scaled_masses_scale_inertia_and_forces(name: str) -> None:
         assert np.allclose(judge.M, scaled.M, atol=ROUNDING * np.abs(scaled.M).max())
 
 
-def test_a_controller_of_a_heavier_robot_is_compiled_and_has_the_torques_of_the_mismatch() -> None:
+def test_a_controller_of_a_heavier_robot_is_compiled_and_has_the_torques_of_the_mismatch():
     robot = judges.load("go2")
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
     compiled = fb.WholeBodyController(
@@ -69,7 +69,7 @@ def test_a_controller_of_a_heavier_robot_is_compiled_and_has_the_torques_of_the_
 
 
 @pytest.mark.parametrize("is_assumed", [True, False])
-def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed: bool) -> None:
+def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed):
     robot = judges.load("go2")
     loaded = robot.with_payload("base", 0.2 * robot.mass, [0.1, 0.0, 0.1])
     sim = fb.Simulation(loaded)
@@ -87,7 +87,7 @@ def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed
     assert abs(sinks) < 1e-3 if is_assumed else sinks > 5e-3
 
 
-def test_a_robot_with_a_payload_is_another_robot_with_the_same_joints() -> None:
+def test_a_robot_with_a_payload_is_another_robot_with_the_same_joints():
     robot = judges.load("go2")
     loaded = robot.with_payload("base", 1.0)
     twice = loaded.with_payload("base", 1.0).with_scaled_mass(2.0)
@@ -99,7 +99,7 @@ def test_a_robot_with_a_payload_is_another_robot_with_the_same_joints() -> None:
         fb.Simulation(judges.load("solo12")).reset(loaded.standing())
 
 
-def test_payloads_that_cannot_be_are_refused() -> None:
+def test_payloads_that_cannot_be_are_refused():
     robot, arm = judges.load("go2"), judges.load("ur5")
     with pytest.raises(UnknownNameError):
         robot.with_payload("back", 1.0)

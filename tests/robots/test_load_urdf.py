@@ -29,7 +29,7 @@ MODELS = sorted((Path(__file__).parents[2] / "assets" / "models").glob("*.urdf")
 
 
 @pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
-def test_a_model_of_our_own_is_the_same_to_mujoco(path: Path) -> None:
+def test_a_model_of_our_own_is_the_same_to_mujoco(path):
     robot = fb.load_urdf(path)
     assert robot.is_floating
     state = robot.random_state(0)
@@ -38,14 +38,12 @@ def test_a_model_of_our_own_is_the_same_to_mujoco(path: Path) -> None:
     assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_an_arm_may_be_bolted_down_or_float() -> None:
+def test_an_arm_may_be_bolted_down_or_float():
     urdf = fb.load("ur5").urdf
     assert (fb.load_urdf(urdf, floating=False).nv, fb.load_urdf(urdf).nv) == (6, 12)
 
 
-def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate() -> (
-    None
-):
+def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate():
     arm = fb.load("ur5", posture=[0.0, -1.7, 1.2, 0.5, 1.5, 0.0])
     loose, standing = with_floating_base(arm), with_floating_base(arm, plate=True)
     assert loose.joint_names == arm.joint_names and loose.mass == pytest.approx(arm.mass)
@@ -60,8 +58,10 @@ def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand
         with_floating_base(judges.load("go2"))
 
 
-@pytest.mark.parametrize("name", [*judges.ROBOTS, *CHANGED])
-def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name: str) -> None:
+@pytest.mark.parametrize(
+    "name", judges.sampled([*judges.ROBOTS, *CHANGED], "go2", "ur5", "kinova", CHANGED[0])
+)
+def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name):
     """CHANGED are those whose loaders change the model after reading it: they cut links, or turn
     the world under the base.
     """
@@ -79,7 +79,7 @@ def test_a_robot_is_the_one_of_example_robot_data_or_is_refused(name: str) -> No
     assert judges.relative(state.h, pin.nle(theirs, data, q, np.array(state.v))) < 1e-12
 
 
-def test_a_person_stands_upright() -> None:
+def test_a_person_stands_upright():
     state = fb.load("human", feet=[]).standing()
     head, pelvis = state.point("middle_head"), state.point("middle_pelvis")
     assert head[2] - pelvis[2] > 0.9 * np.linalg.norm(head - pelvis)
@@ -96,9 +96,7 @@ def test_a_person_stands_upright() -> None:
         ),  # fingers that slide; the second mimics the first
     ],
 )
-def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(
-    name: str, locked: list[str]
-) -> None:
+def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name, locked):
     """M and h are those of the whole robot for the joints that move, to MuJoCo too, which reads the
     changed URDF itself.
     """
@@ -125,7 +123,7 @@ def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(
         assert judges.relative(state.h, h) < 1e-9
 
 
-def test_a_joint_is_locked_only_where_it_can_be() -> None:
+def test_a_joint_is_locked_only_where_it_can_be():
     for kind, posture, *numbers in (
         ("continuous", [2.0, 0.0], 2),
         ("revolute", [10.0], 10, 0.5, 2),
@@ -136,12 +134,12 @@ def test_a_joint_is_locked_only_where_it_can_be() -> None:
             )
 
 
-def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice() -> None:
+def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice():
     urdf = two_links(joint="top").replace("<robot", '\n<?xml version="1.0"?>\n<robot', 1)
     assert fb.load_urdf(urdf, locked=["top", "top"]).d == 0
 
 
-def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path: Path) -> None:
+def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(fb.load("ur5").urdf, encoding="utf-8")
     arm = fb.load_urdf(file, floating=False)
@@ -189,14 +187,10 @@ HUNG = """<link name="tip"><inertial><mass value="1"/>
         (two_links(iyy=-0.1), ("elbow", "inertia", -0.1)),
         (two_links().replace("0 1 0", "0 0 0"), ("elbow", "axis")),
         (two_links(extra=LIMIT.replace("0.5", "3")), ("elbow", "lower", 3, "upper", 2)),
-        (
-            two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")),
-            ("elbow", "lower", 0, "upper", -2),
-        ),
-        (
-            two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'),
-            ("joint", "base"),
-        ),
+        (two_links(extra=LIMIT.replace('"2"', '"-2"').replace('lower="0.5"', "")),
+            ("elbow", "lower", 0, "upper", -2)),
+        (two_links(joint="base").replace('"base"', '"a"', 1).replace('k="base"', 'k="a"'),
+            ("joint", "base")),
         (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), ("link", "base")),
         (two_links(joint="root_joint"), ("joint", "root_joint")),
         (two_links(extra=LIMIT + '<mimic joint="wrist"/>'), ("elbow", "wrist", "mimic", "locked")),
@@ -210,16 +204,12 @@ HUNG = """<link name="tip"><inertial><mass value="1"/>
         (two_links(kind="floating"), ("elbow", 6)),
         ('<robot name="none"><link name="base"/></robot>', ("mass", 0, "inertial")),
     ],
-)
-def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(
-    urdf: str, named: tuple[str | float, ...]
-) -> None:
+)  # fmt: skip
+def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf, named):
     refused(lambda: fb.load_urdf(urdf), InputError, *named)
 
 
-def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none() -> (
-    None
-):
+def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none():
     bolted = (
         two_links(joint="base", kind="fixed")
         .replace('"base"', '"a"', 1)
@@ -230,26 +220,17 @@ def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equa
     assert abs(robot.random_state(0, spread=3.0).q[0]) > 0.0
 
 
-def test_joints_at_zero_stand_at_their_nearest_limit_and_motors_too_weak_for_that_are_told() -> (
-    None
-):
+def test_joints_without_a_posture_stand_at_their_nearest_limit_and_weak_motors_are_reported():
     heavy = two_links(mass=20).replace("<mass", '<origin xyz="0.1 0 0"/><mass')
     with warns(RobotWarning, "elbow", 17.2, 5):
         arm = fb.load_urdf(heavy, floating=False)
     assert arm.standing().q == pytest.approx([0.5])
-    refused(
-        lambda: fb.load_urdf(heavy, floating=False, posture=[0.4]),
-        InputError,
-        "posture",
-        "elbow",
-        0.4,
-        0.5,
-        2,
-    )
+    with raises(InputError, "posture", "elbow", 0.4, 0.5, 2):
+        fb.load_urdf(heavy, floating=False, posture=[0.4])
     refused(lambda: fb.load_urdf(heavy, floating=False, locked=["elbow"]), InputError)
 
 
-def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_used_is_named(tmp_path):
     refused(lambda: fb.load_urdf(tmp_path / "nothing.urdf"), InputError, "nothing.urdf")
     refused(lambda: fb.load_urdf("zero\0.urdf"), InputError, "path")
     refused(lambda: fb.load_urdf("go2"), InputError, 'fb.load("go2")')
@@ -259,7 +240,7 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["solo12", "talos", "go2"])
-def test_straight_legs_are_reported_if_no_posture_is_given(name: str) -> None:
+def test_straight_legs_are_reported_if_no_posture_is_given(name):
     robot = judges.load(name)
     feet = list(robot.feet)
     with warnings.catch_warnings():

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from messages import raises
+from numpy.testing import assert_array_equal
 
 import floatbase as fb
 from floatbase.control import AnalyticController
@@ -27,12 +28,12 @@ def floating(request: pytest.FixtureRequest):
     return judges.load(request.param)
 
 
-def test_the_catalogue_holds_the_robots_of_the_course_and_says_what_each_is_for() -> None:
+def test_the_catalogue_holds_the_robots_of_the_course_with_their_descriptions():
     assert {"go2", "solo12", "solo8", "anymal_kinova", "talos", "ur5"} <= set(fb.catalogue())
     assert all(len(text) > 10 for text in fb.catalogue().values())
 
 
-def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None:
+def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot):
     assert robot.nv - robot.d == (6 if robot.is_floating else 0)
     tau = np.random.default_rng(0).normal(size=robot.d)
     generalised = robot.S @ tau
@@ -40,7 +41,7 @@ def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot) -> None
     assert np.array_equal(generalised[robot.nv - robot.d :], tau)
 
 
-def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
+def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot):
     root = ElementTree.fromstring(robot.urdf)
     masses = [
         float(mass.get("value"))
@@ -51,7 +52,7 @@ def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot) -> None:
     assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
 
 
-def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
+def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot):
     tau = np.zeros(robot.d)
     for i, joint in enumerate(robot.joint_names):
         tau[i] = 1.0
@@ -60,9 +61,7 @@ def test_the_joint_of_each_torque_is_named_in_the_order_of_tau(robot) -> None:
         tau[i] = 0.0
 
 
-def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says_otherwise(
-    robot,
-) -> None:
+def test_torque_limits_are_positive_and_equal_the_urdfs_unless_another_source_is_named(robot):
     assert np.all(robot.torque_limits > 0)
     assert robot.torque_limits.shape == (robot.d,)
     joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
@@ -76,7 +75,7 @@ def test_torque_limits_are_positive_and_those_of_the_urdf_unless_the_source_says
         assert np.all(robot.torque_limits < urdf)
 
 
-def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating) -> None:
+def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating):
     state = floating.standing()
     judge = judges.mujoco_of(floating.name).move_to(state)
     for foot in floating.feet:
@@ -89,7 +88,7 @@ def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating) -> No
     assert not np.any(state.v)
 
 
-def test_a_standing_robot_has_its_centre_of_mass_over_its_feet(floating) -> None:
+def test_a_standing_robot_has_its_centre_of_mass_over_its_feet(floating):
     from scipy.spatial import ConvexHull
 
     state = floating.standing()
@@ -98,28 +97,27 @@ def test_a_standing_robot_has_its_centre_of_mass_over_its_feet(floating) -> None
     assert np.all(hull.equations @ np.append(state.com[:2], 1.0) < -0.01)
 
 
-def test_a_robot_stands_at_the_requested_height(floating) -> None:
+def test_a_robot_stands_at_the_requested_height(floating):
     usual = floating.standing()
     state = floating.standing(height=0.97 * usual.q[2])
     assert state.q[2] == pytest.approx(0.97 * usual.q[2], abs=1e-9)
     assert np.allclose(judges.stance(floating).positions(state)[:, 2], 0.0, atol=1e-9)
 
 
-def test_a_robot_that_stands_low_keeps_its_joint_limits_or_says_which_are_in_the_way() -> None:
+def test_a_robot_that_stands_low_keeps_its_joint_limits_or_names_those_that_prevent_it():
     """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by
     1.5 rad too much.
     """
     go2, talos = judges.load("go2"), judges.load("talos")
     low = go2.standing(height=0.0)
     assert np.allclose(judges.stance(go2).positions(low)[:, 2], 0.0, atol=1e-9)
-    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:]) and np.all(
-        low.q[7:] <= go2.model.upperPositionLimit[7:]
-    )
+    assert np.all(low.q[7:] >= go2.model.lowerPositionLimit[7:])
+    assert np.all(low.q[7:] <= go2.model.upperPositionLimit[7:])
     with raises(InputError, 0.3, "leg_left_4_joint", 2.62):
         talos.standing(height=0.3)
 
 
-def test_a_reference_posture_beyond_a_limit_is_moved_by_a_whole_turn_where_that_suffices() -> None:
+def test_a_reference_posture_beyond_a_limit_is_moved_by_a_whole_turn_where_that_suffices():
     theirs, robot = example_robot_data.load("kinova"), fb.load("kinova")
     data = theirs.model.createData()
     pin.framesForwardKinematics(theirs.model, data, theirs.q0)
@@ -133,7 +131,7 @@ def test_a_reference_posture_beyond_a_limit_is_moved_by_a_whole_turn_where_that_
         )
 
 
-def test_a_robot_without_joints_falls_under_every_controller() -> None:
+def test_a_robot_without_joints_falls_under_every_controller():
     robot = fb.load("hector", feet=[])
     state, contacts = robot.standing(), fb.Contacts.none()
     for controller in (
@@ -146,13 +144,13 @@ def test_a_robot_without_joints_falls_under_every_controller() -> None:
     assert joint_servo(state)(state.q, state.v, 0.0).tau.shape == (0,)
 
 
-def test_a_seed_may_be_any_whole_number() -> None:
+def test_a_seed_may_be_any_whole_number():
     robot = judges.load("go2")
     for seed in (3.0, np.int64(3), np.random.default_rng(3)):
-        np.testing.assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
+        assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
 
 
-def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:
+def test_joints_of_standing_and_random_states_keep_their_limits(robot):
     model = robot.model
     for state in [robot.standing(), *judges.states(robot.name, 10, spread=0.5)]:
         for joint in range(1, model.njoints):
@@ -165,21 +163,21 @@ def test_joints_of_standing_and_random_states_keep_their_limits(robot) -> None:
                 )
 
 
-def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robot) -> None:
+def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robot):
     assert np.array_equal(robot.random_state(3).q, robot.random_state(3).q)
     assert np.array_equal(robot.random_state(3).v, robot.random_state(3).v)
     assert not np.allclose(robot.random_state(3).q, robot.random_state(4).q)
     assert not np.allclose(robot.random_state(3).v, robot.random_state(4).v)
 
 
-def test_any_quadruped_of_example_robot_data_loads_once_its_feet_are_given() -> None:
+def test_any_quadruped_of_example_robot_data_loads_once_its_feet_are_given():
     robot = fb.load("anymal", feet=["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"], foot_radius=0.03)
     assert [foot.radius for foot in robot.feet] == [0.03] * 4
     positions = fb.Contacts.points(robot).positions(robot.standing())
     assert np.allclose(positions[:, 2], 0.0, atol=1e-9)
 
 
-def test_limits_and_postures_that_are_given_replace_those_of_the_catalogue() -> None:
+def test_limits_and_postures_that_are_given_replace_those_of_the_catalogue():
     go2 = judges.load("go2")
     q = go2.posture.copy()
     q[7:] += 0.01

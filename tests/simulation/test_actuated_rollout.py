@@ -16,9 +16,8 @@ import pytest
 import floatbase as fb
 from floatbase.actuators import HydraulicActuators, Hydraulics
 
-PUSH = (
-    fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),
-)  # N: a fifth of go2's weight for 0.2 s
+# N: a fifth of go2's weight for 0.2 s
+PUSH = (fb.Push(np.array([30.0, 0.0, 0.0]), start=0.1, duration=0.2),)
 
 
 @cache
@@ -64,16 +63,14 @@ def sway(rollout: fb.Rollout) -> float:
 # what the loop and the record do
 
 
-def test_without_actuators_applied_torques_are_desired_ones(sim: fb.Simulation) -> None:
+def test_without_actuators_applied_torques_are_desired_ones(sim):
     sim.reset()
     rollout = fb.rollout(sim, controller(), 0.02, control_period=4e-3)
     assert rollout.tau.shape == rollout.tau_desired.shape == (5, 12)
     assert np.array_equal(rollout.tau, rollout.tau_desired)
 
 
-def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(
-    sim: fb.Simulation,
-) -> None:
+def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mean(sim):
     sim.reset()
     lag = Lag(0.1)
     rollout = fb.rollout(sim, controller(), 0.012, control_period=4e-3, actuators=lag)
@@ -81,14 +78,13 @@ def test_torques_pass_the_actuators_in_every_step_and_the_record_keeps_their_mea
     for tick in range(3):
         calls = lag.calls[4 * tick : 4 * tick + 4]
         assert all(np.array_equal(tau, rollout.tau_desired[tick]) for tau, *_ in calls)
-        assert np.array_equal(calls[0][1], rollout.q[tick][7:]) and np.array_equal(
-            calls[0][2], rollout.v[tick][6:]
-        )
+        assert np.array_equal(calls[0][1], rollout.q[tick][7:])
+        assert np.array_equal(calls[0][2], rollout.v[tick][6:])
         mean = 0.1 * (4 * tick + 2.5) * rollout.tau_desired[tick]
         assert np.allclose(rollout.tau[tick], mean, rtol=1e-12)
 
 
-def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation) -> None:
+def test_the_physics_gets_what_the_actuators_give(sim):
     """With actuators that give no torque, the robot falls like a limp one."""
 
     def limp(q: np.ndarray, v: np.ndarray, t: float) -> SimpleNamespace:
@@ -101,7 +97,7 @@ def test_the_physics_gets_what_the_actuators_give(sim: fb.Simulation) -> None:
     assert held_back.q[-1, 2] < held_back.q[0, 2] - 0.01
 
 
-def test_joints_without_limits_reach_the_actuators_as_angles() -> None:
+def test_joints_without_limits_reach_the_actuators_as_angles():
     robot = fb.load("kinova")
     assert robot.nq > robot.nv
     sim, lag = fb.Simulation(robot), Lag(0.0)
@@ -115,7 +111,7 @@ def test_joints_without_limits_reach_the_actuators_as_angles() -> None:
     assert np.allclose(rates, [v for *_, v, _ in lag.calls][1:], atol=1e-6)
 
 
-def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None:
+def test_a_rollout_leaves_the_actuators_memory_alone(sim):
     """Two rollouts of 0.05 s equal one of 0.1 s."""
     records = []
     for parts in ((0.1,), (0.05, 0.05)):
@@ -131,7 +127,7 @@ def test_a_rollout_leaves_the_actuators_memory_alone(sim: fb.Simulation) -> None
 # the URDF of g1 has no rotors: oil on an ankle of 3e-4 kg m² is a spring of 3400 rad/s, which no
 # step of 1 ms resolves
 @pytest.mark.parametrize("name", [name for name in judges.ROBOTS if name != "g1"])
-def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
+def test_every_robot_holds_itself_up_with_cylinders(name):
     """Every joint is within 5 % of its torque limit of the desired torque from 10 ms on.
 
     At the end, after 0.5 s, it is within 0.1 %. (In the first millisecond the contacts give way,
@@ -157,9 +153,7 @@ def test_every_robot_holds_itself_up_with_cylinders(name: str) -> None:
 # go2 on slower and slower force loops
 
 
-def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
-    sim: fb.Simulation,
-) -> None:
+def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(sim):
     """Within 0.5 s at 50 Hz: CoM within 0.3 mm, feet within 0.2 mm, torques within 0.2 N·m."""
     rollout = stand(sim, 50.0, duration=0.5)
     assert rollout.outcome == "completed"
@@ -170,9 +164,7 @@ def test_go2_stands_through_a_fast_force_loop_as_it_does_with_ideal_torques(
     assert np.max(error[-100:]) < 5e-3
 
 
-def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(
-    sim: fb.Simulation,
-) -> None:
+def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torques(sim):
     """A push of 30 N for 0.2 s moves both by 12 mm, with a difference of at most 0.1 mm."""
     sim.reset()
     ideal = fb.rollout(sim, controller(), 0.6, PUSH)
@@ -182,9 +174,7 @@ def test_a_push_moves_go2_no_further_on_a_fast_force_loop_than_with_ideal_torque
     assert sway(hydraulic) == pytest.approx(sway(ideal), abs=1e-4)
 
 
-def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(
-    sim: fb.Simulation,
-) -> None:
+def test_the_slowest_loop_on_which_go2_stands_a_push_has_between_1_and_1_5_hz(sim):
     """This is above 0.84 Hz, below which the lag alone makes an otherwise ideal task unstable."""
     assert growth(0.85) < 0.0 < growth(0.83)
     assert stand(sim, 1.0, PUSH).outcome == "fell"
@@ -202,9 +192,7 @@ def growth(bandwidth: float) -> float:
     return float(np.max(np.roots(characteristic).real))
 
 
-def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(
-    sim: fb.Simulation,
-) -> None:
+def test_a_slow_valve_does_not_let_go2_fall_because_shut_in_oil_holds_the_joints(sim):
     """A valve of 1 Hz hardly moves: the torques lag, but stiff springs of oil hold the joints."""
     sim.reset()
     actuators = HydraulicActuators(sim.robot, Hydraulics(valve_bandwidth=1.0))

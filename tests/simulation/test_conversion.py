@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
 
 import judges
 import numpy as np
@@ -21,7 +20,7 @@ any_robot = st.sampled_from(judges.ROBOTS)
 
 
 @given(seed=seeds, name=any_robot)
-def test_a_state_survives_the_way_to_mujoco_and_back(seed: int, name: str) -> None:
+def test_a_state_survives_the_way_to_mujoco_and_back(seed, name):
     state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
     qpos, qvel = convert.to_mujoco(state.q, state.v)
     assert np.allclose(convert.q(qpos), state.q, atol=1e-12)
@@ -30,8 +29,8 @@ def test_a_state_survives_the_way_to_mujoco_and_back(seed: int, name: str) -> No
 
 @given(seed=seeds, name=st.sampled_from(judges.FLOATING))
 def test_mujoco_gets_the_scalar_of_the_quaternion_first_and_the_linear_velocity_in_the_world(
-    seed: int, name: str
-) -> None:
+    seed, name
+):
     state, convert = judges.load(name).random_state(seed, 0.7), judges.mujoco_of(name).convert
     qpos, qvel = convert.to_mujoco(state.q, state.v)
     assert np.array_equal(qpos[3:7], state.q[[6, 3, 4, 5]])
@@ -40,7 +39,7 @@ def test_mujoco_gets_the_scalar_of_the_quaternion_first_and_the_linear_velocity_
 
 
 @given(seed=seeds, name=any_robot)
-def test_joints_keep_their_names_on_the_way_to_mujoco(seed: int, name: str) -> None:
+def test_joints_keep_their_names_on_the_way_to_mujoco(seed, name):
     robot, judge = judges.load(name), judges.mujoco_of(name)
     state = robot.random_state(seed, 0.7)
     qpos, qvel = judge.convert.to_mujoco(state.q, state.v)
@@ -51,7 +50,7 @@ def test_joints_keep_their_names_on_the_way_to_mujoco(seed: int, name: str) -> N
             assert qpos[judge.model.joint(joint).qposadr[0]] == state.q[robot.model.idx_qs[number]]
 
 
-def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us() -> None:
+def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us():
     robot = fb.load("kinova")
     turning = [j for j in range(1, robot.model.njoints) if robot.model.nqs[j] == 2]
     assert turning, "the Kinova arm has joints that turn without limit"
@@ -73,7 +72,7 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
         assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_freely() -> None:
+def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_freely():
     """MuJoCo would weld a link named "world" to the ground; ur5's own URDF has one."""
     arm = judges.load("ur5")
     loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)
@@ -100,17 +99,16 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_fre
         ("bolt", ["FL_FOOT"]),  # feet with inertia and no mass
     ],
 )
-def test_welded_links_move_as_one_body_whatever_each_of_them_is(name: str, feet: list[str]) -> None:
+def test_welded_links_move_as_one_body_whatever_each_of_them_is(name, feet):
     state = fb.load(name, feet=feet, foot_radius=0.02).random_state(0)
     judge = judges.Mujoco(state.robot).move_to(state)
-    size = np.sqrt(
-        state.M.diagonal()
-    )  # each entry relative to its own joints', or a shank's would not show next to the trunk's
+    # each entry relative to its own joints', or a shank's would not show next to the trunk's
+    size = np.sqrt(state.M.diagonal())
     assert np.max(np.abs(state.M - judge.M) / np.outer(size, size)) < 1e-9
     assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_path: Path) -> None:
+def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_path):
     """<inertial> may be rotated (rpy) both in a fused link and in the link that it is fused to."""
 
     def link(name: str, inertia: str, rpy: str) -> str:
@@ -141,7 +139,7 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
     assert judges.relative(state.h, judge.h) < 1e-12
 
 
-def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_hold() -> None:
+def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_hold():
     with raises(SimulationError, "r_hip_1", "icub_reduced", 0) as caught:
         fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"]))
     found = re.search(r"locked=(\[.*?\])", str(caught.value))

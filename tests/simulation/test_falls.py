@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 import pickle
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import judges
 import numpy as np
@@ -75,8 +75,8 @@ def lowest(state: fb.State) -> dict[str, float]:
     return low
 
 
-@pytest.mark.parametrize("towards", [20.0, 90.0, 110.0, 180.0, 290.0])
-def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards: float) -> None:
+@pytest.mark.parametrize("towards", [20.0, 110.0, 180.0])
+def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards):
     record = pushed("go2", 400.0, towards)
     assert record.outcome in ("fell", "controller failed")
     low = lowest(record.final)
@@ -85,9 +85,8 @@ def test_go2_pushed_with_400_N_lies_on_the_ground_at_the_end(towards: float) -> 
     assert np.abs(record.final.v).max() < SLOW  # at rest
 
 
-@pytest.mark.parametrize("name", ["talos", "anymal_kinova"])
-@pytest.mark.parametrize("towards", [80.0, 190.0])
-def test_other_robots_lie_on_the_ground_too(name: str, towards: float) -> None:
+@pytest.mark.parametrize(("name", "towards"), [("talos", 80.0), ("anymal_kinova", 190.0)])
+def test_other_robots_lie_on_the_ground_too(name, towards):
     record = pushed(name, 4.0 * judges.load(name).weight, towards, settling_time=2.5)
     assert record.outcome in ("fell", "controller failed")
     low = lowest(record.final)
@@ -95,7 +94,7 @@ def test_other_robots_lie_on_the_ground_too(name: str, towards: float) -> None:
     assert record.final.com[2] < 0.6 * record.state(0).com[2]
 
 
-def test_where_links_touch_nothing_the_trunk_goes_into_the_ground() -> None:
+def test_where_links_touch_nothing_the_trunk_goes_into_the_ground():
     sim = fb.Simulation(judges.load("go2"))
     pushed("go2", 400.0, 20.0, settling_time=0.0, sim=sim)
     assert not sim.link_collisions
@@ -105,7 +104,7 @@ def test_where_links_touch_nothing_the_trunk_goes_into_the_ground() -> None:
 
 
 @pytest.mark.parametrize("towards", [20.0, 110.0])
-def test_a_rollout_that_settles_is_the_same_up_to_the_fall(towards: float) -> None:
+def test_a_rollout_that_settles_is_the_same_up_to_the_fall(towards):
     short, long = (pushed("go2", 400.0, towards, settle) for settle in (0.0, SETTLING_TIME))
     n = len(short)
     assert len(long) == n + round(SETTLING_TIME / PERIOD)
@@ -117,7 +116,7 @@ def test_a_rollout_that_settles_is_the_same_up_to_the_fall(towards: float) -> No
     assert np.isnan(long.planned[n:]).all() and np.isfinite(long.planned[:n]).all()
 
 
-def test_motors_brake_within_their_limits() -> None:
+def test_motors_brake_within_their_limits():
     record = pushed("go2", 400.0, 20.0)
     n = int(np.searchsorted(record.time, record.controller_off_time or 0.0))
     power = np.einsum("ij,ij->i", record.tau_desired[n:], record.v[n:, 6:])
@@ -125,27 +124,24 @@ def test_motors_brake_within_their_limits() -> None:
     assert np.all(np.abs(record.tau) <= record.robot.torque_limits + 1e-9)
 
 
-def test_a_run_that_ends_well_has_no_fall() -> None:
+def test_a_run_that_ends_well_has_no_fall():
     record = fb.rollout(
         fb.Simulation(judges.load("go2")), judges.controller_of("go2"), 0.02, settling_time=0.1
     )
     assert (record.outcome, record.controller_off_time, len(record)) == ("completed", None, 20)
 
 
-def test_a_controller_that_fails_at_once_lets_the_robot_lie_down() -> None:
+def test_a_controller_that_fails_at_once_lets_the_robot_lie_down():
     def fails(q: np.ndarray, v: np.ndarray, t: float) -> None:
         raise fb.InfeasibleError("no answer")
 
     record = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.1, settling_time=1.5)
-    assert (record.outcome, record.controller_off_time, len(record)) == (
-        "controller failed",
-        0.0,
-        1500,
-    )
+    expected = ("controller failed", 0.0, 1500)
+    assert (record.outcome, record.controller_off_time, len(record)) == expected
     assert record.final.q[2] < 0.5 * record.q[0, 2] and min(lowest(record.final).values()) > -DEPTH
 
 
-def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
+def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row():
     """Torques, forces and times are those of complete control steps."""
 
     class Breaks:
@@ -159,27 +155,17 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row() -> None:
             return tau_desired if self.steps < 14 else np.full(12, np.nan)
 
     robot = judges.load("go2")
-    record = fb.rollout(
-        fb.Simulation(robot),
-        judges.controller_of("go2"),
-        0.1,
-        (),
-        5e-3,
-        Breaks(),
-        settling_time=0.1,
-    )
+    options = {"control_period": 5e-3, "actuators": Breaks(), "settling_time": 0.1}
+    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, **options)
     assert record.outcome == "controller failed" and len(record) == 2 + 20
     assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)
-    assert np.allclose(
-        record.tau[2],
-        np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits),
-        atol=1e-9,
-    )
+    expected = np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits)
+    assert np.allclose(record.tau[2], expected, atol=1e-9)
     assert np.abs(record.tau_desired[2]).max() > 1e-3
 
 
-def test_links_touch_from_a_fall_to_the_next_reset() -> None:
+def test_links_touch_from_a_fall_to_the_next_reset():
     robot = judges.load("go2")
     sim = fb.Simulation(robot)
     once = pushed("go2", 100.0, 90.0, sim=sim)
@@ -193,14 +179,14 @@ def test_links_touch_from_a_fall_to_the_next_reset() -> None:
     assert np.array_equal(once.q, again.q) and np.array_equal(once.measured, again.measured)
 
 
-def test_forces_are_those_at_the_feet_whatever_else_touches() -> None:
+def test_forces_are_those_at_the_feet_whatever_else_touches():
     """A lying robot's feet support only part of its weight, as other links touch; none pulls."""
     record = pushed("go2", 400.0, 180.0)
     pressing = record.measured.reshape(len(record), -1, 3)[-1, :, 2]
     assert pressing.min() >= 0.0 and pressing.sum() < 0.9 * record.robot.weight
 
 
-def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_feet_only() -> None:
+def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_feet_only():
     sim = PerturbedSimulation(
         judges.load("go2"),
         perturbation=Perturbation(disabled_contacts=["FL_foot"], adhesion_force=10.0),
@@ -217,15 +203,13 @@ def test_a_disabled_contact_stays_disabled_after_a_reset_and_adhesion_acts_on_fe
     assert sim.contact_forces()[0, 2] > 0.0
 
 
-def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
+def test_a_robot_that_begins_to_lie_is_where_it_was():
     """Switching link collisions on and off changes neither state, time, forces nor feet."""
     sim = fb.Simulation(judges.load("go2"))
     for _ in range(50):
         sim.step(np.full(12, 0.5))
-    state, before = (
-        sim.state,
-        (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces()),
-    )
+    state = sim.state
+    before = (sim.time, sim.torques(), sim.contact_positions(), sim.contact_forces())
     for touch in (True, False):
         sim.link_collisions = touch
         assert np.array_equal(sim.q, state.q) and np.array_equal(sim.v, state.v)
@@ -235,7 +219,7 @@ def test_a_robot_that_begins_to_lie_is_where_it_was() -> None:
         assert sim.contact_forces().shape == (4, 3) and np.all(sim.contact_forces()[:, 2] >= 0.0)
 
 
-def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None:
+def test_another_world_while_the_robot_lies_holds_after_it_is_put_back():
     sim = PerturbedSimulation(judges.load("go2"))
     sim.link_collisions = True
     sim.perturbation = Perturbation(
@@ -250,9 +234,7 @@ def test_another_world_while_the_robot_lies_holds_after_it_is_put_back() -> None
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda sim: pickle.loads(pickle.dumps(sim))])
-def test_a_copy_of_a_robot_that_lies_moves_alone(
-    copied: Callable[[fb.Simulation], fb.Simulation],
-) -> None:
+def test_a_copy_of_a_robot_that_lies_moves_alone(copied):
     sim = fb.Simulation(judges.load("go2"))
     sim.link_collisions = True
     other = copied(sim)
@@ -263,14 +245,13 @@ def test_a_copy_of_a_robot_that_lies_moves_alone(
     other.step(np.zeros(12))
     fresh = fb.Simulation(judges.load("go2"))
     fresh.step(np.zeros(12))
-    assert np.array_equal(other.q, fresh.q) and np.array_equal(
-        other.contact_forces(), fresh.contact_forces()
-    )
+    assert np.array_equal(other.q, fresh.q)
+    assert np.array_equal(other.contact_forces(), fresh.contact_forces())
     sim.step(np.zeros(12))
     assert sim.link_collisions and sim.time == pytest.approx(sim.timestep)
 
 
-def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
+def test_a_robot_without_its_meshes_keeps_the_primitives():
     """Without mesh files, the robot is built with the hulls of boxes and cylinders."""
     robot = judges.load("anymal_kinova")
     bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
@@ -280,7 +261,7 @@ def test_a_robot_without_its_meshes_keeps_the_primitives() -> None:
     assert 0 < sims[0].model.nmesh < sims[1].model.nmesh
 
 
-def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls() -> None:
+def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls():
     sim = fb.Simulation(judges.load("ur5"))
     sim.link_collisions = True
     assert sim.model.ngeom == 1
@@ -306,9 +287,7 @@ def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
 FALL = [400.0 * np.cos(0.35), 400.0 * np.sin(0.35), 0.0]
 
 
-def test_a_live_fall_is_told_at_once_drawn_on_and_comes_to_rest(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_live_fall_is_reported_at_once_and_simulated_until_rest(run, slices):
     told: list[tuple[str, int]] = []
     run.on_status(lambda status: told.append((status, len(slices))))
     run.push(FALL)
@@ -335,21 +314,17 @@ def fall_and_wait(run: LiveSimulation, slices: list[fb.Rollout]) -> int:
     return len(slices)
 
 
-def test_a_push_or_a_reset_in_mid_fall_begins_anew(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_push_or_a_reset_in_mid_fall_begins_anew(run, slices):
     for again in (run.reset, lambda: run.push([0.0, 20.0, 0.0])):
         count = fall_and_wait(run, slices)
         again()
-        until(lambda count=count: any(record.time[0] == 0.0 for record in slices[count:]))  # type: ignore[misc]
+        until(lambda count=count: any(record.time[0] == 0.0 for record in slices[count:]))
         assert run.status == "running" and not run.sim.link_collisions
         until(lambda: slices[-1].time[-1] > 0.2)
         assert slices[-1].outcome == "completed"
 
 
-def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(run, slices):
     fall_and_wait(run, slices)
     run.close()
     count = len(slices)
@@ -360,9 +335,7 @@ def test_a_pause_in_mid_fall_stops_the_picture_and_a_start_begins_anew(
     assert slices[count].time[0] == 0.0
 
 
-def test_another_simulation_in_mid_fall_does_not_fall(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_another_simulation_in_mid_fall_does_not_fall(run, slices):
     fall_and_wait(run, slices)
     other = fb.Simulation(judges.load("go2"))
     run.set_controller(judges.controller_of("go2"), sim=other)
@@ -370,7 +343,7 @@ def test_another_simulation_in_mid_fall_does_not_fall(
     assert other.time == 0.0 and not other.link_collisions
 
 
-def test_an_error_while_a_fall_is_drawn_is_said() -> None:
+def test_an_error_while_a_fall_is_drawn_is_reported():
     seen: list[fb.Rollout] = []
 
     def show(record: fb.Rollout) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import judges
 import mujoco
 import numpy as np
@@ -40,7 +37,7 @@ GROUNDS = {
 
 
 @pytest.mark.parametrize("name", GROUNDS)
-def test_height_and_normal_are_what_a_ray_from_above_meets(name: str) -> None:
+def test_height_and_normal_are_what_a_ray_from_above_meets(name):
     ground = GROUNDS[name]
     sim = fb.Simulation(judges.load("go2"), ground)
     aside = np.array(sim.robot.standing().q)
@@ -57,7 +54,7 @@ def test_height_and_normal_are_what_a_ray_from_above_meets(name: str) -> None:
         assert ground.height(point) == height and isinstance(ground.height(point), float)
 
 
-def test_stairs_tiles_and_gap_have_the_heights_that_they_are_made_for() -> None:
+def test_stairs_tiles_and_gap_have_the_heights_that_they_are_made_for():
     up, down = Ground.stairs(3, 0.1, run=0.3, start=0.5), Ground.stairs(3, -0.1, run=0.3, start=0.5)
     x = np.array([-5.0, 0.49, 0.51, 0.81, 1.11, 5.0])
     xy = np.column_stack([x, np.zeros(6)])
@@ -72,7 +69,7 @@ def test_stairs_tiles_and_gap_have_the_heights_that_they_are_made_for() -> None:
     assert not np.array_equal(tiles.box_bounds, Ground.tiles(0.05, seed=5).box_bounds)
 
 
-def test_clearances_of_a_box_are_distances_from_its_nearest_face_or_edge() -> None:
+def test_clearances_of_a_box_are_distances_from_its_nearest_face_or_edge():
     ground = Ground(boxes=[Box([0.0, 1.0], [0.0, 1.0], 0.5)])
     points = [[0.5, 0.5, 0.7], [1.3, 0.5, 0.2], [1.3, 0.5, 0.9], [0.9, 0.5, 0.3], [2, 2, 1.5]]
     expected = [0.2, 0.3, 0.5, -0.1, np.sqrt(3.0)]
@@ -80,7 +77,7 @@ def test_clearances_of_a_box_are_distances_from_its_nearest_face_or_edge() -> No
     assert np.allclose(ground.clearances(points)[:, 0], np.array(points)[:, 2])
 
 
-def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane() -> None:
+def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane():
     """A push, a slip and a fall included: boxes have the friction of planes and meet hulls, too."""
     robot = judges.load("go2")
     grounds = Ground(0.3), Ground(0.3, offset=-1.0, boxes=[Box([-9, 9], [-9, 9], 0.0)])
@@ -103,7 +100,7 @@ def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane() -> None:
         assert 0.0 < sim.state.q[2] < 0.2, "the links lie on the ground"
 
 
-def test_measured_forces_carry_the_robot_across_the_edge_of_a_step() -> None:
+def test_measured_forces_carry_the_robot_across_the_edge_of_a_step():
     """On an edge, contact normals are oblique; forces and mass times acceleration still agree."""
     robot = judges.load("go2")
     front = max(foot_x for foot_x in fb.Simulation(robot).contact_positions()[:, 0])
@@ -127,10 +124,10 @@ def test_measured_forces_carry_the_robot_across_the_edge_of_a_step() -> None:
         assert np.any(np.abs(oblique) > 0.0)
 
 
-@pytest.mark.parametrize("name", ["talos", "g1"])
-@pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("degrees", [-10.0, 10.0])
-def test_a_biped_starts_upright_on_a_slope_and_stands(name: str, axis: int, degrees: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "axis", "degrees"), [("talos", 0, 10.0), ("talos", 1, -10.0), ("g1", 0, -10.0)]
+)
+def test_a_biped_starts_upright_on_a_slope_and_stands(name, axis, degrees):
     robot, normal = judges.load(name), slope(degrees, axis)
     sim = fb.Simulation(robot, Ground(normal=normal, offset=0.1))
     start, home = sim.state, robot.standing()
@@ -153,13 +150,13 @@ def test_a_biped_starts_upright_on_a_slope_and_stands(name: str, axis: int, degr
 
 
 @pytest.mark.parametrize("ground", ["stairs down", "gap"])
-def test_a_robot_on_a_platform_starts_as_on_level_ground(ground: str) -> None:
+def test_a_robot_on_a_platform_starts_as_on_level_ground(ground):
     robot = judges.load("talos")
     sim = fb.Simulation(robot, GROUNDS[ground])
     assert np.allclose(sim.state.q, robot.standing().q, atol=LENGTHS)
 
 
-def test_go2_starts_with_its_feet_on_boxes_of_different_heights() -> None:
+def test_go2_starts_with_its_feet_on_boxes_of_different_heights():
     robot = judges.load("go2")
     sim = fb.Simulation(robot, Ground.stairs(1, 0.08, start=0.0))
     feet = sim.contact_positions()
@@ -169,7 +166,7 @@ def test_go2_starts_with_its_feet_on_boxes_of_different_heights() -> None:
     assert fb.rollout(sim, controller, 0.3).slip().max() < 2e-3
 
 
-def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has() -> None:
+def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has():
     robot = judges.load("go2")
     sim = fb.Simulation(robot, Ground.stairs(1, 0.5, start=1.0))
     low = sim.state
@@ -181,16 +178,6 @@ def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has() -> 
     sim.data.qpos[2] = 0.55
     mujoco.mj_forward(sim.model, sim.data)
     assert sim.fallen
-
-
-def test_a_copied_ground_is_equal_and_refuses_changes() -> None:
-    ground = GROUNDS["tiles"]
-    loaded = pickle.loads(pickle.dumps(ground))
-    assert copy.copy(ground) is ground
-    assert np.array_equal(loaded.box_bounds, ground.box_bounds)
-    assert loaded.height([1.0, 0.3]) == ground.height([1.0, 0.3])
-    with pytest.raises(AttributeError):
-        ground.mu = 0.5  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
@@ -209,21 +196,19 @@ def test_a_copied_ground_is_equal_and_refuses_changes() -> None:
         (lambda: Ground(normal=[1.0, 0.0, 0.0]).height([0.0, 0.0]), "vertical"),
     ],
 )
-def test_grounds_that_cannot_be_are_refused(make: object, number: str) -> None:
+def test_grounds_that_cannot_be_are_refused(make, number):
     with pytest.raises(InputError) as raised:
-        make()  # type: ignore[operator]
+        make()
     assert number in str(raised.value)
 
 
-def test_a_sole_beside_a_box_is_parallel_to_the_slope() -> None:
+def test_a_sole_beside_a_box_is_parallel_to_the_slope():
     robot = judges.load("talos")
     ground = Ground(normal=[0.0, -0.1, 1.0], boxes=[Box([-1.0, 1.0], [0.02, 1.0], 0.06)])
     state = fb.Simulation(robot, ground=ground).state
     for foot in robot.feet:
         corners = np.array([state.point(foot.frame, corner) for corner in foot.corners])
         assert np.allclose(corners[:, 2], ground.height(corners[:, :2]), rtol=0.0, atol=1e-8)
-        middle, up = (
-            state.point(foot.frame, foot.middle),
-            state.frame_pose(foot.frame).rotation[:, 2],
-        )
+        middle = state.point(foot.frame, foot.middle)
+        up = state.frame_pose(foot.frame).rotation[:, 2]
         assert np.allclose(up, ground.normal(middle[:2]), rtol=0.0, atol=1e-8)

@@ -11,6 +11,7 @@ from itertools import pairwise
 import judges
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from waiting import until
 
 import floatbase as fb
@@ -43,9 +44,7 @@ def run(slices: list[fb.Rollout]) -> Iterator[LiveSimulation]:
     live.close()
 
 
-def test_it_runs_pauses_and_goes_on_where_it_was(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_it_runs_pauses_and_goes_on_where_it_was(run, slices):
     run.start()
     until(lambda: len(slices) > 3)
     run.close()  # pauses, and waits for the last slice
@@ -59,9 +58,9 @@ def test_it_runs_pauses_and_goes_on_where_it_was(
 @pytest.mark.parametrize(
     "error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")]
 )
-def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
-    run: LiveSimulation, slices: list[fb.Rollout], error: Exception
-) -> None:
+def test_an_error_of_a_controller_is_reported_and_the_run_can_go_on_with_another(
+    run, slices, error
+):
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
         raise error
 
@@ -82,15 +81,12 @@ def test_a_bug_in_a_controller_is_said_and_the_run_can_be_mended(
         ("paused", "", "paused"),
         ("idle", "", "paused"),
         ("fell", "", "fell"),
-        (
-            "controller failed",
-            "no point satisfies all constraints. In conflict:\n  6 × friction.",
-            "controller failed: no point satisfies all constraints",
-        ),
+        ("controller failed", "no point satisfies all constraints. In conflict:\n  6 × friction.",
+            "controller failed: no point satisfies all constraints"),
         ("stopped", "0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
     ],
-)
-def test_what_stopped_a_run_is_told_in_one_sentence(status: str, reason: str, line: str) -> None:
+)  # fmt: skip
+def test_the_status_message_is_one_sentence(status, reason, line):
     message = status_message(status, reason)
     assert message.startswith(line) and not {"\n", "Why", "6"} & {*message, *message.split()}
 
@@ -130,7 +126,7 @@ def held_run(held: Held) -> Iterator[LiveSimulation]:
     live.close()
 
 
-def test_pushes_before_a_reset_are_forgotten(held_run: LiveSimulation, held: Held) -> None:
+def test_pushes_before_a_reset_are_forgotten(held_run, held):
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
@@ -144,9 +140,7 @@ def test_pushes_before_a_reset_are_forgotten(held_run: LiveSimulation, held: Hel
     assert all(not s.pushes for s in held.slices[count:])
 
 
-def test_a_push_after_a_reset_that_is_still_to_come_acts(
-    held_run: LiveSimulation, held: Held
-) -> None:
+def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run, held):
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
@@ -161,9 +155,7 @@ def test_a_push_after_a_reset_that_is_still_to_come_acts(
 HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: a downward push that no controller withstands
 
 
-def test_the_same_push_after_a_fall_has_the_same_result_every_time(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_the_same_push_after_a_fall_has_the_same_result_every_time(run, slices):
     falls = []
     for _ in range(5):
         count = len(slices)
@@ -177,12 +169,10 @@ def test_the_same_push_after_a_fall_has_the_same_result_every_time(
         assert fall[0].time[0] == 0.0
         assert [(p.start, *p.force) for p in fall[0].pushes] == [(0.0, *HARD[0])]
         assert fall[-1].time[-1] == falls[0][-1].time[-1]
-        np.testing.assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
+        assert_allclose(fall[-1].final.q, falls[0][-1].final.q, atol=1e-9)
 
 
-def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(run, slices):
     """The next thread waits for the last one, which is held here while it reports the fall."""
     go_on = threading.Event()
     run.on_status(lambda status: status == "fell" and go_on.wait(15.0))
@@ -196,9 +186,7 @@ def test_a_push_is_not_lost_however_late_the_thread_comes_to_the_reset(
     assert [p.force[1] for p in slices[count].pushes] == [30.0]
 
 
-def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(
-    held_run: LiveSimulation, held: Held
-) -> None:
+def test_a_reset_or_a_pause_that_crosses_a_fall_is_kept(held_run, held):
     def fall() -> None:
         held.hold("fell")
         held_run.push(*HARD)
@@ -230,9 +218,7 @@ def threads() -> list[threading.Thread]:
     return [thread for thread in threading.enumerate() if thread.name == "floatbase-live"]
 
 
-def test_a_pause_ends_the_thread_and_a_close_has_ended_it(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_pause_ends_the_thread_and_a_close_has_ended_it(run, slices):
     before = len(threads())
     run.start()
     until(lambda: len(slices) > 0)
@@ -243,9 +229,7 @@ def test_a_pause_ends_the_thread_and_a_close_has_ended_it(
     assert len(threads()) == before
 
 
-def test_it_runs_after_a_start_that_crosses_a_close(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_it_runs_after_a_start_that_crosses_a_close(run, slices):
     for _ in range(10):
         run.start()
         closing = threading.Thread(target=run.close)
@@ -254,15 +238,14 @@ def test_it_runs_after_a_start_that_crosses_a_close(
         closing.join()
         if run.status == "running":
             count = len(slices)
-            until(lambda count=count: len(slices) > count)  # type: ignore[misc]
+            until(lambda count=count: len(slices) > count)
         run.close()
         assert run.status == "paused"
-    assert all(
-        late.time[0] > early.time[-1] for early, late in pairwise(slices)
-    )  # one thread at a time
+    # one thread at a time
+    assert all(late.time[0] > early.time[-1] for early, late in pairwise(slices))
 
 
-def test_a_status_is_told_as_it_comes(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_each_change_of_status_is_reported(run, slices):
     told: list[str] = []
     run.on_status(told.append)
     run.start()
@@ -275,7 +258,7 @@ def test_a_status_is_told_as_it_comes(run: LiveSimulation, slices: list[fb.Rollo
     assert told == ["running", "paused", "running", "fell"]
 
 
-def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
+def test_a_forgotten_run_pauses_by_itself(slices):
     run = LiveSimulation(fb.Simulation(ROBOT), controller(), slices.append, idle_timeout=0.2)
     run.start()
     until(lambda: run.status == "idle")
@@ -286,9 +269,7 @@ def test_a_forgotten_run_pauses_by_itself(slices: list[fb.Rollout]) -> None:
     run.close()
 
 
-def test_a_push_is_on_record_until_it_has_been_seen(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_a_push_is_on_record_until_it_has_been_seen(run, slices):
     run.push([0.0, 20.0, 0.0], duration=0.1)
     run.start()
     until(lambda: bool(slices) and slices[-1].time[-1] > 1.0)
@@ -299,7 +280,7 @@ def test_a_push_is_on_record_until_it_has_been_seen(
     assert not any(push_at(s, -1) for s in slices if s.time[-1] > 0.1)
 
 
-def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.Rollout]) -> None:
+def test_actuators_stand_between_and_begin_anew_with_the_robot(slices):
     class Delay:
         """Actuators that give the torques desired one step earlier."""
 
@@ -327,15 +308,13 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices: list[fb.R
     run.close()
     assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
     desired = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])
-    np.testing.assert_allclose(slices[1].tau[0], desired, atol=1e-9)
+    assert_allclose(slices[1].tau[0], desired, atol=1e-9)
     run.reset()
     until(lambda: delay.resets == 1)
     run.close()
 
 
-def test_another_world_controller_and_period_are_taken_between_slices(
-    run: LiveSimulation, slices: list[fb.Rollout]
-) -> None:
+def test_another_world_controller_and_period_are_taken_between_slices(run, slices):
     run.start()
     until(lambda: len(slices) > 2)
     ice, seen = fb.Simulation(ROBOT, 0.3), list[threading.Thread]()
@@ -352,7 +331,7 @@ def test_another_world_controller_and_period_are_taken_between_slices(
     assert seen[0] is not threading.main_thread()
 
 
-def test_a_change_that_fails_is_said(run: LiveSimulation, slices: list[fb.Rollout]) -> None:
+def test_an_error_in_a_change_is_reported(run, slices):
     def fail() -> None:
         raise ValueError("no such world")
 
@@ -364,7 +343,7 @@ def test_a_change_that_fails_is_said(run: LiveSimulation, slices: list[fb.Rollou
     until(lambda: run.status == "running" and len(slices) > 1)
 
 
-def test_a_second_thread_cannot_use_a_simulation_that_runs() -> None:
+def test_a_second_thread_cannot_use_a_simulation_that_runs():
     sim = fb.Simulation(judges.load("go2"))
     refused: list[Exception] = []
 

@@ -28,7 +28,7 @@ class Recording:
         return SimpleNamespace(tau=np.zeros(self.d))
 
 
-def test_a_controller_gets_what_the_observers_return_one_after_the_other() -> None:
+def test_a_controller_gets_what_the_observers_return_one_after_the_other():
     robot = judges.load("go2")
     controller, calls = Recording(robot.d), []
 
@@ -50,7 +50,7 @@ def test_a_controller_gets_what_the_observers_return_one_after_the_other() -> No
 
 
 @pytest.mark.parametrize("name", ["go2", "anymal_kinova", "ur5"])
-def test_sensor_noise_has_the_given_standard_deviations(name: str) -> None:
+def test_sensor_noise_has_the_given_standard_deviations(name):
     robot, seed = judges.load(name), int(np.random.default_rng(0).integers(2**32))
     state = judges.states(name, 1)[0]
     noise, n = SensorNoise(robot, seed).scaled(2.0), 2000
@@ -66,7 +66,7 @@ def test_sensor_noise_has_the_given_standard_deviations(name: str) -> None:
     assert np.all(np.abs(np.mean(errors, axis=0)) < 6.0 * expected / np.sqrt(n))
 
 
-def test_noise_depends_on_seed_and_time_alone() -> None:
+def test_noise_depends_on_seed_and_time_alone():
     robot = judges.load("go2")
     state, noise, again = robot.standing(), SensorNoise(robot, 5), SensorNoise(robot, 5)
     late = [noise(state.q, state.v, t)[1] for t in (0.3, 0.1, 0.2)]
@@ -78,7 +78,7 @@ def test_noise_depends_on_seed_and_time_alone() -> None:
     assert np.array_equal(none[0], state.q) and np.array_equal(none[1], state.v)
 
 
-def test_measurements_arrive_after_their_latency_and_a_reset_begins_anew() -> None:
+def test_measurements_arrive_after_their_latency_and_a_reset_begins_anew():
     robot = judges.load("go2")
     controller, sim = Recording(robot.d), fb.Simulation(robot)
     observed = Observed(controller, Latency(q=0.003, v=0.0045))
@@ -94,7 +94,7 @@ def test_measurements_arrive_after_their_latency_and_a_reset_begins_anew() -> No
         assert np.array_equal(old[0], new[0]) and np.array_equal(old[1], new[1])
 
 
-def test_a_walk_with_noise_and_latency_walks_and_repeats_itself() -> None:
+def test_a_walk_with_noise_and_latency_walks_and_repeats_itself():
     robot = judges.load("go2")
     contacts = fb.Contacts.feet(robot, mu=0.6)
     walk = Walk(robot, contacts, Gait.trot(robot, start=0.2), velocity=[0.2, 0.0])
@@ -107,7 +107,7 @@ def test_a_walk_with_noise_and_latency_walks_and_repeats_itself() -> None:
     assert np.array_equal(runs[0].q, runs[1].q)
 
 
-def test_the_wrapper_has_the_attributes_of_the_controller_but_not_its_methods() -> None:
+def test_the_wrapper_has_the_attributes_of_the_controller_but_not_its_methods():
     robot, controller = judges.load("go2"), judges.controller_of("go2")
     observed = Observed(controller, SensorNoise(robot))
     assert observed.contacts is controller.contacts and observed.robot is robot
@@ -120,7 +120,7 @@ def test_the_wrapper_has_the_attributes_of_the_controller_but_not_its_methods() 
         observed.velocity = [1.0, 0.0]
 
 
-def test_observers_that_cannot_be_are_refused() -> None:
+def test_observers_that_cannot_be_are_refused():
     robot = judges.load("go2")
     for make, number in (
         (lambda: Observed(3.0), "3.0"),

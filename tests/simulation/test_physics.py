@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
 
 import judges
 import mujoco
@@ -51,7 +50,7 @@ def angular_momentum(state: State) -> np.ndarray:
 name = judges.every_floating_robot
 
 
-def test_a_robot_in_the_air_falls_with_g(name: str) -> None:
+def test_a_robot_in_the_air_falls_with_g(name):
     sim = fb.Simulation(judges.load(name))
     start = flying(name)
     sim.reset(start)
@@ -59,13 +58,12 @@ def test_a_robot_in_the_air_falls_with_g(name: str) -> None:
         sim.step(np.zeros(sim.robot.d))
     assert sim.time == pytest.approx(0.1)
     assert np.allclose(sim.state.com_velocity, 0.1 * G, atol=1e-6)
-    assert np.allclose(
-        sim.state.com - start.com, 0.005 * G, atol=6e-4
-    )  # half a step of semi-implicit Euler
+    # half a step of semi-implicit Euler
+    assert np.allclose(sim.state.com - start.com, 0.005 * G, atol=6e-4)
     assert not np.any(sim.contact_forces())
 
 
-def test_motors_change_neither_momentum_of_a_robot_in_the_air(name: str) -> None:
+def test_motors_change_neither_momentum_of_a_robot_in_the_air(name):
     sim, rng = fb.Simulation(judges.load(name), timestep=2e-4), np.random.default_rng(0)
     start = flying(name, seed=0, speed=0.1)
     sim.reset(start)
@@ -76,7 +74,7 @@ def test_motors_change_neither_momentum_of_a_robot_in_the_air(name: str) -> None
     assert np.allclose(angular_momentum(end), angular_momentum(start), atol=2e-3 * m)
 
 
-def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str) -> None:
+def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name):
     """Halving the timestep halves the energy error: damping, friction and armature add nothing."""
     start, lost = flying(name, seed=1, speed=0.2), []
     for timestep in (4e-4, 2e-4):
@@ -91,12 +89,11 @@ def test_energy_is_kept_in_flight_but_for_the_integrators_first_order(name: str)
     assert abs(2.0 * lost[1] - lost[0]) < 0.05 * abs(lost[0]) + 1e-6
 
 
-def test_the_work_of_the_motors_is_what_the_energy_gains(name: str) -> None:
+def test_the_work_of_the_motors_is_what_the_energy_gains(name):
     start, rng = flying(name, seed=2, speed=0.1), np.random.default_rng(0)
     robot = start.robot
-    gentle = (
-        500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
-    )  # N·m for 500 rad/s²: no joint reaches its limits
+    # N·m for 500 rad/s²: no joint reaches its limits
+    gentle = 500.0 / np.diag(np.linalg.inv(start.M))[-robot.d :]
     tau = rng.uniform(-0.3, 0.3, robot.d) * np.minimum(
         np.minimum(robot.torque_limits, 0.01 * robot.weight), gentle
     )
@@ -113,8 +110,22 @@ def test_the_work_of_the_motors_is_what_the_energy_gains(name: str) -> None:
     assert abs(2.0 * misses[1] - misses[0]) < 0.02 * abs(work) and abs(work) > 1e-3
 
 
+def test_a_horizontal_push_has_its_magnitude_and_direction() -> None:
+    for towards, direction in (
+        (0.0, [1, 0, 0]),
+        (90.0, [0, 1, 0]),
+        (-135.0, [-(0.5**0.5)] * 2 + [0]),
+    ):
+        push = fb.Push.horizontal(40.0, towards, start=0.2, duration=0.3, frame="FL_foot")
+        np.testing.assert_allclose(push.force, 40.0 * np.array(direction), atol=1e-12)
+        assert (push.start, push.duration, push.frame) == (0.2, 0.3, "FL_foot")
+    np.testing.assert_allclose(
+        fb.Push.horizontal(-40.0, 30.0).force, fb.Push.horizontal(40.0, 210.0).force
+    )
+
+
 @pytest.mark.parametrize("force", [[30.0, 0.0, 0.0], [0.0, -20.0, 10.0]])
-def test_a_push_gives_the_momentum_force_times_time(name: str, force: list[float]) -> None:
+def test_a_push_gives_the_momentum_force_times_time(name, force):
     sim = fb.Simulation(judges.load(name))
     start = flying(name)
     sim.reset(start)
@@ -125,7 +136,7 @@ def test_a_push_gives_the_momentum_force_times_time(name: str, force: list[float
     assert np.allclose(gained, 0.05 * np.array(force), rtol=1e-2, atol=2e-2)
 
 
-def test_a_push_acts_in_its_own_steps_and_no_others() -> None:
+def test_a_push_acts_in_its_own_steps_and_no_others():
     sim = fb.Simulation(judges.load("go2"))
     sim.reset(flying("go2"))
     push, speeds = fb.Push([30.0, 0.0, 0.0], start=0.003, duration=0.004), [0.0]
@@ -136,7 +147,7 @@ def test_a_push_acts_in_its_own_steps_and_no_others() -> None:
     assert list(pushed) == [3, 4, 5, 6]
 
 
-def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_between_steps() -> None:
+def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_between_steps():
     """Pushes of a free ball: shorter than a step, over many steps, and both at once.
 
     MuJoCo's steps conserve its momentum up to rounding.
@@ -146,10 +157,8 @@ def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_betw
         f'<robot name="ball"><link name="ball"><inertial>{inertia}</inertial></link></robot>'
     )
     sim, rng = fb.Simulation(ball), np.random.default_rng(0)
-    starts, durations = (
-        rng.uniform(0.0, 0.02, 40),
-        rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40),
-    )
+    starts = rng.uniform(0.0, 0.02, 40)
+    durations = rng.choice([1e-4, 5e-4, 1.5e-3, 8e-3], 40) * rng.uniform(0.5, 1.0, 40)
     pushes = [fb.Push(rng.normal(size=3), *times) for times in zip(starts, durations, strict=True)]
     for some in ([pushes[0]], pushes):
         sim.reset(ball.neutral().replace(q=[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0]))
@@ -159,7 +168,7 @@ def test_the_impulse_of_a_push_is_force_times_duration_however_its_ends_lie_betw
         assert np.allclose(2.0 * (sim.state.com_velocity - 0.04 * G), impulse, rtol=0.0, atol=1e-12)
 
 
-def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -> None:
+def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name):
     """Angular momentum about the CoM grows by (p - com) × F dt, for frames all over the robot."""
     robot = judges.load(name)
     start = flying(name, seed=3, speed=0.2).replace(v=np.zeros(robot.nv))
@@ -173,7 +182,7 @@ def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name: str) -
         assert np.allclose(gained, expected, atol=2e-2 * np.linalg.norm(expected)), frame
 
 
-def test_pushes_add_up() -> None:
+def test_pushes_add_up():
     sim = fb.Simulation(judges.load("go2"))
     force = np.array([10.0, 5.0, 0.0])
     speeds = []
@@ -185,7 +194,7 @@ def test_pushes_add_up() -> None:
     assert np.allclose(speeds[0], speeds[1], atol=1e-12)
 
 
-def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name: str) -> None:
+def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name):
     robot = judges.load(name)
     sims = [fb.Simulation(robot) for _ in range(3)]
     signs = np.where(np.arange(robot.d) % 2, 1.0, -1.0)
@@ -197,9 +206,7 @@ def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name: str) -> None:
     assert not np.allclose(sims[0].v, sims[2].v)
 
 
-def test_absurd_torques_are_cut_at_the_limit_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_absurd_torques_are_cut_at_the_limit_too(tmp_path, monkeypatch):
     """MuJoCo drops all controls if one without a limit exceeds 1e10, so limits must come first."""
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log to the working directory
     robot = judges.load("go2")
@@ -212,7 +219,7 @@ def test_absurd_torques_are_cut_at_the_limit_too(
     assert np.array_equal(speeds[0], speeds[1])
 
 
-def test_each_motor_turns_its_own_joint(name: str) -> None:
+def test_each_motor_turns_its_own_joint(name):
     robot = judges.load(name)
     start = flying(name)
     sim = fb.Simulation(robot, timestep=1e-5)
@@ -228,7 +235,7 @@ def test_each_motor_turns_its_own_joint(name: str) -> None:
         ), robot.joint_names[i]
 
 
-def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:
+def test_measured_forces_are_what_changes_the_momentum(name):
     """Σ (forces + weight + push) dt = m Δv_com over a push and a recovery, in the world frame."""
     robot = judges.load(name)
     start = robot.standing()
@@ -249,7 +256,7 @@ def test_measured_forces_are_what_changes_the_momentum(name: str) -> None:
     )
 
 
-def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
+def test_measured_forces_belong_to_the_points_they_are_named_after():
     """The foot below a downward push has a larger force."""
     robot = judges.load("go2")
     start = robot.standing()
@@ -264,9 +271,7 @@ def test_measured_forces_belong_to_the_points_they_are_named_after() -> None:
         assert np.all(np.abs(np.delete(extra, i)) < 8.0)
 
 
-def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it() -> (
-    None
-):
+def test_a_steeper_slope_than_friction_allows_lets_a_robot_slide_and_a_flatter_one_holds_it():
     """A robot with fixed joints slides if tan θ > μ, and stays if tan θ < μ: Coulomb's law."""
     robot = judges.load("go2")
     slid = {}
@@ -297,7 +302,7 @@ def on_slope(robot: fb.Robot, angle: float) -> State:
     return State(robot, q)
 
 
-def test_a_robot_on_a_slope_is_carried_upright_by_tilted_feet_that_share_the_worlds_frame() -> None:
+def test_a_robot_on_a_slope_is_carried_upright_by_tilted_feet_that_share_the_worlds_frame():
     robot, angle = judges.load("go2"), 0.25
     start, ground = on_slope(robot, angle), Ground(normal=slope_normal(angle))
     sim = fb.Simulation(robot, ground)
@@ -316,7 +321,7 @@ def test_a_robot_on_a_slope_is_carried_upright_by_tilted_feet_that_share_the_wor
     assert record.slip().max() < 1e-3
 
 
-def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say() -> None:
+def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say():
     robot = judges.load("ur5")
     state = robot.random_state(0)
     tau = np.linspace(-5.0, 5.0, 6)
@@ -324,12 +329,11 @@ def test_an_arm_bolted_to_the_ground_accelerates_as_the_equations_say() -> None:
     sim.reset(state)
     sim.step(tau)
     eom = fb.equations_of_motion(state, fb.Contacts.none())
-    assert np.allclose(
-        (sim.v - state.v) / 1e-5, judges.aba(eom, tau, np.zeros(0)), rtol=1e-3, atol=1e-2
-    )
+    expected = judges.aba(eom, tau, np.zeros(0))
+    assert np.allclose((sim.v - state.v) / 1e-5, expected, rtol=1e-3, atol=1e-2)
 
 
-def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -> None:
+def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone():
     sim = fb.Simulation(judges.load("go2"))
     sim.model.opt.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
     sim.step(np.zeros(12))
@@ -339,7 +343,7 @@ def test_measured_forces_do_not_depend_on_mujocos_shape_of_the_friction_cone() -
     assert np.allclose(sim.contact_forces().sum(axis=0), change, atol=0.01 * sim.robot.weight)
 
 
-def test_feet_near_the_ground_get_no_force() -> None:
+def test_feet_near_the_ground_get_no_force():
     """MuJoCo lists a contact without a force for a ball closer to the ground than its gap."""
     sim = fb.Simulation(judges.load("go2"))
     sim.model.geom_gap[:] = 0.05
@@ -358,14 +362,14 @@ def test_feet_near_the_ground_get_no_force() -> None:
     assert np.allclose(sim.contact_forces(), expected, rtol=1e-12)
 
 
-def test_a_copy_of_a_simulation_falls_as_the_simulation_does() -> None:
+def test_a_copy_of_a_simulation_falls_as_the_simulation_does():
     sim = copy.deepcopy(fb.Simulation(judges.load("go2")))
     for _ in range(1500):
         sim.step(np.zeros(12))
     assert sim.fallen
 
 
-def test_resetting_gives_the_same_run_again() -> None:
+def test_resetting_gives_the_same_run_again():
     robot = judges.load("go2")
     sim = fb.Simulation(robot)
     controller = fb.WholeBodyController(

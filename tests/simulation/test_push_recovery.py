@@ -41,9 +41,7 @@ def survives(controller: fb.WholeBodyController, angle: float, force: float) -> 
     return fb.rollout(sim, controller, 0.1 + 0.1 + WATCH, [push]).outcome == "completed"
 
 
-def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
-    recovery: PushRecovery, standing: fb.WholeBodyController
-) -> None:
+def test_the_push_recovery_map_separates_survival_from_falls_and_is_symmetric(recovery, standing):
     assert np.allclose(recovery.directions, np.deg2rad([0, 60, 120, 180, 240, 300]))
     left, right = recovery.pushes[1:3], recovery.pushes[:3:-1]
     assert np.all(np.abs(left - right) <= STEP)  # go2 is symmetric
@@ -53,9 +51,7 @@ def test_the_rose_lies_between_survived_and_fatal_and_is_its_own_mirror(
     assert "6 directions" in repr(recovery)
 
 
-def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
-    recovery: PushRecovery,
-) -> None:
+def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(recovery):
     state, robot = recovery.state, recovery.state.robot
     feet, com = recovery.contacts.positions(state), state.com
     height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
@@ -92,13 +88,12 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(
         axis=1,
     )
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
-    assert np.allclose(
-        recovery.static_bound, tips, rtol=1e-3
-    )  # the feet are level to a fraction of a millimetre
+    # the feet are level to a fraction of a millimetre
+    assert np.allclose(recovery.static_bound, tips, rtol=1e-3)
     assert np.all(recovery.static_bound < recovery.pushes)  # a short push can be larger
 
 
-def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
+def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
     axis = push_recovery_plots.plot(recovery)
     measured = axis.get_lines()[0]
     assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
@@ -106,16 +101,12 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
         "largest push survived", "capture-point bound (theory)", "static bound (theory)",
     ]  # fmt: skip
     plt.close(axis.figure)
-    refused(
-        lambda: push_recovery_plots.plot(recovery, plt.figure().add_subplot()), InputError, "polar"
-    )
+    with raises(InputError, "polar"):
+        push_recovery_plots.plot(recovery, plt.figure().add_subplot())
     plt.close("all")
     near, far = (push_recovery_plots.picture(recovery, scale) for scale in (0.001, 0.002))
-    assert {path.split("/")[0] for path in near} == {
-        "push_recovery",
-        "capture_point_bound",
-        "static_bound",
-    }
+    expected = {"push_recovery", "capture_point_bound", "static_bound"}
+    assert {path.split("/")[0] for path in near} == expected
     assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {
         "push_recovery"
     }
@@ -128,18 +119,13 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
     before = replace(recovery, pushes=recovery.pushes / 2)
     axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
     grey = axis.get_lines()[1]
-    assert (
-        np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
-        and grey.get_label() == "largest push survived, previous run"
-    )
+    assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
+    assert grey.get_label() == "largest push survived, previous run"
     plt.close(axis.figure)
     assert {
         path.split("/")[0]
         for path in push_recovery_plots.picture(recovery, theory=False, previous=before)
-    } == {
-        "push_recovery",
-        "previous",
-    }
+    } == {"push_recovery", "previous"}
     other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
     refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
     ends = [
@@ -149,14 +135,7 @@ def test_the_rose_is_plotted_and_drawn_to_scale(recovery: PushRecovery) -> None:
     assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
 
 
-def test_factories_and_what_does_not_fit(standing: fb.WholeBodyController) -> None:
-    robot = standing.robot
-
-    def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
-        raise InfeasibleError("no torque")
-
-    vars(fails)["robot"] = robot
-    short = {"directions": 3, "workers": 1}
+def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
     for make, options, error, *named in (
         (standing, {"directions": 2}, InputError, "directions", 2, 3),
         (standing, {"resolution": 0.0}, InputError, "resolution", 0),
@@ -164,9 +143,23 @@ def test_factories_and_what_does_not_fit(standing: fb.WholeBodyController) -> No
         (3, {}, InputError, "push_recovery", 3),
         (lambda: 3, {}, InputError, 3),
         (judges.limp, {}, InputError, "push_recovery", "limp", "q"),
-        (lambda: fails, short, SimulationError, "no torque"),
-        (lambda: (fb.Simulation(robot), judges.limp), short, SimulationError, 0),
         (lambda: (fb.Simulation(fb.load("ur5")), judges.limp), {}, InputError, "ur5"),
     ):
         with raises(error, *named):
             fb.push_recovery(make, **QUICK | options)
+
+
+@pytest.mark.front_end
+def test_push_recovery_needs_a_robot_that_stands_without_a_push(standing):
+    robot = standing.robot
+
+    def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
+        raise InfeasibleError("no torque")
+
+    vars(fails)["robot"] = robot
+    for make, reason in (
+        (lambda: fails, "no torque"),
+        (lambda: (fb.Simulation(robot), judges.limp), 0),
+    ):
+        with raises(SimulationError, reason):
+            fb.push_recovery(make, directions=3, workers=1, **QUICK)

@@ -56,17 +56,14 @@ def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options:
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.04])  # m, of the valley's bottom to the left
-def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
+def test_go2_stands_in_a_valley_with_a_level_base(shift):
     robot, (left, right) = judges.load("go2"), sides(20.0)
     sim = fb.Simulation(
         robot, Ground(normal=[left, right], offset=[shift * left[1], shift * right[1]])
     )
     start = sim.state
-    assert np.allclose(
-        start.frame_pose("base").rotation,
-        robot.standing().frame_pose("base").rotation,
-        atol=LENGTHS,
-    )
+    expected = robot.standing().frame_pose("base").rotation
+    assert np.allclose(start.frame_pose("base").rotation, expected, atol=LENGTHS)
     clearances = sim.ground.clearances(sim.contact_positions())
     assert np.allclose(clearances.min(axis=1), 0.0, atol=LENGTHS)
     on_left = np.argmin(clearances, axis=1) == 0
@@ -88,7 +85,7 @@ def test_go2_stands_in_a_valley_with_a_level_base(shift: float) -> None:
     )
 
 
-def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() -> None:
+def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet():
     """The lower feet push the upper ones into the slope; the CoM is not between the feet."""
     robot, (left, right) = judges.load("go2"), sides(40.0)
     slope, y_high, y_low = np.tan(np.deg2rad(40.0)), 0.16, -0.06
@@ -109,9 +106,8 @@ def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() 
     )
     assert record.slip().max() < 2e-3
     assert np.linalg.norm(record.final.com - state.com) < 5e-3
-    assert np.allclose(
-        record.measured[-1], record.planned[-1], rtol=0.0, atol=STEADY * robot.weight
-    )
+    expected = record.planned[-1]
+    assert np.allclose(record.measured[-1], expected, rtol=0.0, atol=STEADY * robot.weight)
     # on level ground the same feet, at the same places seen from above, cannot
     level = fb.Contacts.points(robot, mu=1.0)
     spot = with_feet(
@@ -122,13 +118,11 @@ def test_in_a_steep_valley_go2_stands_with_its_centre_of_mass_beside_its_feet() 
     assert wrench_set(spot, level, facets=8).support_region()[:, 1].max() < spot.com[1]
 
 
-def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> None:
+def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides():
     robot, (left, right) = judges.load("go2"), sides(30.0)
-    home, contacts, bottom = (
-        robot.standing(),
-        fb.Contacts.points(robot),
-        robot.feet[0].radius / np.cos(np.deg2rad(30.0)),
-    )
+    home = robot.standing()
+    contacts = fb.Contacts.points(robot)
+    bottom = robot.feet[0].radius / np.cos(np.deg2rad(30.0))
     centres = {
         foot.frame: home.frame_pose(foot.frame).translation * [1, 0, 0] + [0, 0, bottom]
         for foot in robot.feet
@@ -145,14 +139,13 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides() -> Non
     assert len(sim.data.contact.geom) == 8
     forces = sim.contact_forces()
     assert np.allclose(record.measured[-1], forces.ravel())
-    assert np.allclose(
-        forces[:, 2], record.planned[-1].reshape(4, 3)[:, 2], atol=0.1 * robot.weight
-    )
+    expected = record.planned[-1].reshape(4, 3)[:, 2]
+    assert np.allclose(forces[:, 2], expected, atol=0.1 * robot.weight)
     assert forces[:, 2].sum() == pytest.approx(robot.weight, rel=0.1)
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name: str) -> None:
+def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name):
     robot, normal, offset = judges.load(name), np.array([0.1, 0.05, 1.0]), 0.3
     near, far = (fb.Simulation(robot, Ground(normal=normal, offset=at)) for at in (0.0, offset))
     shift = offset * near.ground.normals[0]
@@ -161,13 +154,12 @@ def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(n
         for _ in range(20):
             sim.step(np.zeros(robot.d))
     assert np.any(near.contact_forces())
-    assert np.allclose(
-        far.contact_forces(), near.contact_forces(), rtol=1e-3, atol=1e-3 * robot.weight
-    )
+    expected = near.contact_forces()
+    assert np.allclose(far.contact_forces(), expected, rtol=1e-3, atol=1e-3 * robot.weight)
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_standing_on_a_slope_may_keep_the_base_level(name: str) -> None:
+def test_standing_on_a_slope_may_keep_the_base_level(name):
     robot, normal = judges.load(name), np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0)
     state, home = robot.standing(normal=normal, offset=0.2), robot.standing()
     for foot in robot.feet:
@@ -177,7 +169,6 @@ def test_standing_on_a_slope_may_keep_the_base_level(name: str) -> None:
         assert not foot.is_flat or np.allclose(
             state.frame_pose(foot.frame).rotation[:, 2], normal, atol=LENGTHS
         )
-    assert np.allclose(
-        state.frame_pose("base").rotation, home.frame_pose("base").rotation, atol=LENGTHS
-    )
+    expected = home.frame_pose("base").rotation
+    assert np.allclose(state.frame_pose("base").rotation, expected, atol=LENGTHS)
     assert np.allclose(robot.standing(normal=[0.0, 0.0, 2.0]).q, home.q, atol=LENGTHS)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 
 import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
+from waiting import until
 
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
@@ -20,6 +22,16 @@ WHERE = """(path) => {
   return [at.x, -at.z, at.y];
 }"""
 DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
+
+
+def control(page, name: str, call: str) -> None:
+    """Use a control of the page: `setValue(0.5)` of a slider, `fire()` of a button."""
+    page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
+
+
+def eventually(page, condition: Callable[[], object]) -> None:
+    """Wait until a condition holds, while the page works."""
+    until(condition, lambda: page.wait_for_timeout(20))
 
 
 def settle(page, title: str | None = None) -> None:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from waiting import until
 
-from floatbase.dynamics import Contacts
-from floatbase.robots import State
-from floatbase.viewer import Viewer
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import ALARM, CALM, COM, MEASURED, WARNING
 from floatbase.viewer.transport.window import Window
@@ -21,9 +18,7 @@ from .looks import SMALL, WHERE, hue_pixels, picture, settle
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
-def test_a_page_has_what_is_shown(
-    page, viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_a_page_has_what_is_shown(page, viewer, standing, contacts, forces):
     viewer.show(standing, contacts, forces=forces, title="go2 stands")
     page.goto(viewer.url)
     settle(page, "go2 stands")
@@ -34,9 +29,7 @@ def test_a_page_has_what_is_shown(
     assert tree["robot"] == 13
     assert tree["measured"] == tree["cone"] == tree["patch"] == 4
     for name, position in zip(contacts.point_names, contacts.positions(standing), strict=True):
-        np.testing.assert_allclose(
-            page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5
-        )
+        assert_allclose(page.evaluate(WHERE, f"meshcat/measured/{name}"), position, atol=1e-5)
     image = picture(page, "go2_standing")
     for colour in (MEASURED, CALM, WARNING, ALARM, COM):
         assert hue_pixels(image, colour) > 100
@@ -57,7 +50,7 @@ def test_a_page_has_what_is_shown(
 
 
 @pytest.mark.front_end
-def test_the_page_comes_back_when_the_window_does(page) -> None:
+def test_the_page_comes_back_when_the_window_does(page):
     first = Window()
     page.goto(first.web_url)
     until(lambda: first.n_pages == 1)
@@ -82,9 +75,7 @@ VALUES = (
 
 
 @pytest.mark.front_end
-def test_controls_have_any_name_and_the_same_values_in_every_page(
-    page, browser, viewer: Viewer
-) -> None:
+def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer):
     heard: defaultdict[str, list[object]] = defaultdict(list)
     for name in NAMES:
         viewer.add_slider(name, heard[name].append, 0.0, -1.0, 1.0)
@@ -116,9 +107,8 @@ def test_controls_have_any_name_and_the_same_values_in_every_page(
         assert one.evaluate("window.hit") is None
     page.reload()
     page.wait_for_function(f"window.viewer && {now} == '{present}'")
-    viewer.add_slider(
-        NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0
-    )  # made again, as a cell that is run again does
+    # made again, as a cell that is run again does
+    viewer.add_slider(NAMES[0], heard[NAMES[0]].append, 1.0, -1.0, 1.0)
     other.wait_for_function(f"{VALUES}[0] == 1")
     other.close()
     picture(page, "controls")
@@ -144,15 +134,9 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ],
     ids=["WebGL", "DecompressionStream"],
 )
-def test_a_page_says_what_its_browser_lacks(
-    browser,
-    viewer: Viewer,
-    standing: State,
-    tmp_path: Path,
-    lacks: str,
-    pages: tuple[str, ...],
-    words: tuple[str, ...],
-) -> None:
+def test_a_page_names_what_its_browser_lacks(
+    browser, viewer, standing, tmp_path, lacks, pages, words
+):
     viewer.show(standing)
     addresses = {"live": viewer.url, "file": viewer.save(tmp_path / "scene.html").as_uri()}
     page = browser.new_page(viewport=SMALL)

@@ -1,16 +1,13 @@
-"""Gait overlay, the camera that follows a walk, and the gait diagram."""
+"""Gait overlay and the camera that follows a walk."""
 
 from __future__ import annotations
 
 import dataclasses
-import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from browsers import SCREENSHOTS
-from matplotlib.colors import to_hex
-from messages import refused
+from messages import raises, refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.behaviours import Gait, StepPlan, Walk, capture_point
@@ -18,9 +15,8 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.robots import Robot, State
 from floatbase.simulation import Rollout, Simulation
-from floatbase.viewer import Item, Viewer, plots
+from floatbase.viewer import Item, Viewer
 from floatbase.viewer.export import recording
-from floatbase.viewer.plots.run_plots import MIN_LOAD
 from floatbase.viewer.scene.colours import COM, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
 
 ROUNDED = 1e-9  # m: the same place, computed in another order
@@ -65,7 +61,7 @@ def vertices(item: Item) -> np.ndarray:
     )
 
 
-def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_marks_are_where_the_walk_plans(viewer, walked):
     run, walk = walked
     state, look = run.final, viewer.walk_overlay(walk, run.final)
     assert walk.plan is not None and walk.time == run.time[-1]
@@ -74,28 +70,22 @@ def test_marks_are_where_the_walk_plans(viewer: Viewer, walked: tuple[Rollout, W
     assert set(look) == {"dcm", "zmp"} | {f"foothold/{f}" for f in walk.footholds} | {
         f"swing/{f}" for f in swinging
     }
-    np.testing.assert_allclose(
-        look["dcm"].matrix[:2, 3],
-        capture_point(state.com, state.com_velocity, walk.omega),
-        atol=ROUNDED,
-    )
-    np.testing.assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
+    expected = capture_point(state.com, state.com_velocity, walk.omega)
+    assert_allclose(look["dcm"].matrix[:2, 3], expected, atol=ROUNDED)
+    assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
     for foot, place in walk.footholds.items():  # go2's frames are in the middles of its balls
         ring = look[f"foothold/{foot}"]
-        np.testing.assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
+        assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
         assert (
             0.0
             < ring.matrix[2, 3] - (place[2] - run.robot.feet[0].radius)
             < 0.01 * viewer.painter.size
         )
-        assert (
-            np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
-        )  # seen around the foot
+        # seen around the foot
+        assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
 
 
-def test_a_line_follows_the_swing_to_its_foothold(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_line_follows_the_swing_to_its_foothold(viewer, walked):
     run, walk = walked
     look = viewer.walk_overlay(walk, run.final)
     for foot, path in walk.swings.items():
@@ -103,23 +93,20 @@ def test_a_line_follows_the_swing_to_its_foothold(
         ground = [0.0, 0.0, -run.robot.feet[0].radius]
         size = np.linalg.norm(path.end - path.start) + path.height
         for point, at in ((line[0], path.start), (line[-1], path.end)):
-            np.testing.assert_allclose(point, at + ground, atol=POINTS * size)
+            assert_allclose(point, at + ground, atol=POINTS * size)
         middle, *_ = path((path.lift_off + path.touchdown) / 2.0)
         # feet touch down at slightly different heights, so the curve leans by the difference of its
         # ends
         leans = abs(path.end[2] - path.start[2]) + POINTS * size
-        np.testing.assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
+        assert_allclose(line[len(line) // 2], middle + ground, atol=leans)
 
 
-def test_a_swing_with_a_new_target_costs_no_new_shape(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_swing_with_a_new_target_costs_no_new_shape(viewer, walked):
     run, walk = walked
     viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final))
     shapes = {path: item.shape for path, item in viewer.renderer.picture.items()}
-    other = run.state(
-        -20
-    )  # the capture point is elsewhere, and so the picture of the same step differs
+    # the capture point is elsewhere, and so the picture of the same step differs
+    other = run.state(-20)
     viewer.show(
         other,
         walk.contacts,
@@ -135,9 +122,7 @@ def test_a_swing_with_a_new_target_costs_no_new_shape(
     )
 
 
-def test_a_stored_step_is_drawn_as_it_was_planned(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_a_stored_step_is_drawn_as_it_was_planned(viewer, walked):
     run, walk = walked
     step, t = walk.history[2], walk.history[2].time + 0.1
     row = int(np.searchsorted(run.time, t - 1e-9))
@@ -146,21 +131,17 @@ def test_a_stored_step_is_drawn_as_it_was_planned(
     assert {path for path in look if path.startswith("swing/")} == {
         f"swing/{foot}" for foot in step.swings
     }
-    np.testing.assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
+    assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
     for foot, place in step.footholds.items():
-        np.testing.assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
+        assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
-def test_a_walk_has_no_marks_before_its_first_control_step(
-    viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_a_walk_has_no_marks_before_its_first_control_step(viewer, go2, standing):
     walk = Walk(go2, Contacts.feet(go2), Gait.trot(go2))
     assert viewer.walk_overlay(walk, standing) == {} and walk.time is None
 
 
-def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
-    biped: tuple[Rollout, Walk],
-) -> None:
+def test_soles_are_outlined_with_position_and_rotation_at_touchdown(biped):
     run, walk = biped
     viewer = Viewer(run.robot)
     try:
@@ -169,13 +150,11 @@ def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
         outline = vertices(look[f"foothold/{foot}"])
         corners = run.robot.feet[0].corners[:, :2]
         middle = outline[:, :2].mean(axis=0)
-        np.testing.assert_allclose(
-            middle, walk.footholds[foot][:2], atol=1e-3
-        )  # m: the sole's frame is in its middle
+        # m: the sole's frame is in its middle
+        assert_allclose(middle, walk.footholds[foot][:2], atol=1e-3)
         radii = np.linalg.norm(outline[:4, :2] - middle, axis=1)
-        np.testing.assert_allclose(
-            radii, np.linalg.norm(corners, axis=1), atol=1e-3
-        )  # vertices are 16-bit numbers
+        # vertices are 16-bit numbers
+        assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)
         x, y = look[f"foothold/{foot}"].matrix[:2, 0]
         left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
         base = run.final.frame_pose("base").rotation
@@ -184,19 +163,15 @@ def test_soles_are_outlined_with_position_and_rotation_at_touchdown(
         viewer.close()
 
 
-def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(
-    viewer: Viewer, walked: tuple[Rollout, Walk]
-) -> None:
+def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(viewer, walked):
     run, walk = walked
     viewer.show(
         run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final), title="go2 trots"
     )
     items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
     shown = {text: (colour, symbol) for colour, text, symbol in items}
-    assert shown["capture point"] == (hex_code(COM), "ring") and shown["centre of mass"] == (
-        hex_code(COM),
-        "disc",
-    )
+    assert shown["capture point"] == (hex_code(COM), "ring")
+    assert shown["centre of mass"] == (hex_code(COM), "disc")
     assert shown["planned ZMP"] == (hex_code(viewer.painter.text_colour), "diamond")
     assert shown["planned foothold"] == (hex_code(GREYS[1]), "ring") and "swing path" in shown
     assert len({*shown.values()}) == len(shown)  # two of one colour differ in their symbol
@@ -204,43 +179,26 @@ def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(
     assert len(kinds) == 4 and not {MEASURED, PLANNED, *CONE.values()} & set(kinds.values())
 
 
-def test_invalid_overlays_are_refused_by_name(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_invalid_overlays_are_refused_by_name(viewer, walked):
     run, walk = walked
     refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
-    refused(
-        lambda: viewer.walk_overlay(walk, fb.load("solo12").standing()), InputError, "go2", "solo12"
-    )
-    refused(
-        lambda: viewer.step_overlay(walk, 0.0, run.final), InputError, "step", "StepPlan", "Walk"
-    )
-    refused(
-        lambda: viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final),
-        UnknownNameError,
-        "go2",
-        "paw",
-    )
-    refused(
-        lambda: viewer.step_overlay(walk.history[1], np.nan, run.final), InputError, "t", np.nan
-    )
+    with raises(InputError, "go2", "solo12"):
+        viewer.walk_overlay(walk, fb.load("solo12").standing())
+    with raises(InputError, "step", "StepPlan", "Walk"):
+        viewer.step_overlay(walk, 0.0, run.final)
+    with raises(UnknownNameError, "go2", "paw"):
+        viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final)
+    with raises(InputError, "t", np.nan):
+        viewer.step_overlay(walk.history[1], np.nan, run.final)
     refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
     refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout")
-    refused(lambda: plots.plot_normal_forces(run, [plt.gca()]), InputError, "axes", 1, 4)
-    refused(lambda: plots.plot_gait(arm()), InputError, "contacts")
-    plt.close("all")
 
 
 def renamed(step: StepPlan) -> StepPlan:
     return dataclasses.replace(step, footholds={"paw": np.zeros(3)})
 
 
-def arm() -> Rollout:
-    from floatbase.lessons import ConstantTorques
-
-    robot = fb.load("ur5")
-    return fb.rollout(Simulation(robot), ConstantTorques(np.zeros(6)), 0.01)
-
-
-def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Rollout, Walk]) -> None:
+def test_a_recorded_walk_plays_with_its_marks(viewer, walked):
     run, walk = walked
     viewer.play(run, steps=walk.history)
     (command,) = (
@@ -251,84 +209,38 @@ def test_a_recorded_walk_plays_with_its_marks(viewer: Viewer, walked: tuple[Roll
         for clip in command["animations"]
         for track in clip["clip"]["tracks"]
     }
-    first, second = (
-        walk.history[1],
-        walk.history[2],
-    )  # after standing: one pair lifts, then the other
+    # after standing: one pair lifts, then the other
+    first, second = (walk.history[1], walk.history[2])
     for foot in first.swings:
         track = tracks[f"/meshcat/swing/{foot}", ".visible"]
         times, seen = np.array(track["times"]), np.array(track["values"])
-        assert (
-            seen[(times >= first.time) & (times < second.time)].all()
-            and not seen[times < first.time].any()
-        )
+        assert seen[(times >= first.time) & (times < second.time)].all()
+        assert not seen[times < first.time].any()
     assert ("/meshcat/dcm", ".position") in tracks
     before = set(viewer.renderer.picture)
     viewer.play(run)
-    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == {
-        "dcm",
-        "zmp",
-        "foothold",
-        "swing",
-    }
+    expected = {"dcm", "zmp", "foothold", "swing"}
+    assert {path.split("/")[0] for path in before - set(viewer.renderer.picture)} == expected
 
 
-def test_a_followed_path_is_smooth_without_the_sway_of_steps() -> None:
+def test_a_followed_path_is_smooth_without_the_sway_of_steps():
     t = np.linspace(0.0, 4.0, 121)
     straight = np.stack([0.3 * t, -0.1 * t, np.full_like(t, 0.3)], axis=1)
-    np.testing.assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
+    assert_allclose(recording.smoothed(t, straight), straight, atol=ROUNDED)
     swayed = straight + 0.02 * np.stack([0.0 * t, np.sin(2.0 * np.pi * t / 0.5), 0.0 * t], axis=1)
     left = recording.smoothed(t, swayed) - straight
     assert np.abs(left[30:-30]).max() < 0.02 / 100.0
     short = straight[:2]
-    np.testing.assert_array_equal(recording.smoothed(t[:2], short), short)
+    assert_array_equal(recording.smoothed(t[:2], short), short)
     refused(lambda: recording.smoothed(t, straight[:3]), InputError, 121, 3)
 
 
-def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer: Viewer, standing: State) -> None:
+def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer, standing):
     q = standing.q.copy()
     q[:2] = 40.0, -21.0
     viewer.show(State(viewer.robot, q))
     lines = vertices(viewer.renderer.picture["ground"])
     low, high = lines.min(axis=0), lines.max(axis=0)
     assert (low[:2] < q[:2] - 3.0).all() and (high[:2] > q[:2] + 3.0).all()
-    np.testing.assert_allclose(
-        lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3
-    )  # the same lines
-
-
-def test_a_gait_diagram_shows_stances_and_measured_contacts(
-    walked: tuple[Rollout, Walk],
-) -> None:
-    run, _ = walked
-    axis = plots.plot_gait(run)
-    names = [label.get_text() for label in axis.get_yticklabels()]
-    assert names == list(run.contacts.names)
-    for i, (name, bars) in enumerate(zip(names, axis.collections, strict=False)):
-        spans = np.array([path.get_extents().intervalx for path in bars.get_paths()])
-        t = (run.time[:-1] + run.time[1:]) / 2.0
-        barred = ((t[:, None] > spans[:, 0]) & (t[:, None] < spans[:, 1])).any(axis=1)
-        stands = [name in run.contacts_at(row).names for row in range(len(t))]
-        np.testing.assert_array_equal(barred, stands)
-        loaded = np.isfinite(np.asarray(axis.lines[i].get_ydata(), dtype=float))
-        np.testing.assert_array_equal(loaded, run.force(name)[:, 2] > MIN_LOAD * run.robot.weight)
-        assert 0.02 < np.mean(~loaded) < 0.8  # it was in the air, and stood
-    assert {to_hex(line.get_color()).upper() for line in axis.lines} == {hex_code(MEASURED)}
-    assert "push" in [text.get_text() for text in axis.get_legend().get_texts()]
-    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
-    axis.figure.savefig(SCREENSHOTS / "plot_gait.png")
-    plt.close("all")
-
-
-def test_normal_forces_are_plotted_for_each_foot(biped: tuple[Rollout, Walk]) -> None:
-    run, _ = biped
-    _, grid = plt.subplots(3, 1, sharex=True)
-    plots.plot_gait(run, grid[0])
-    axes = plots.plot_normal_forces(run, grid[1:])
-    for axis, name in zip(axes, run.contacts.names, strict=True):
-        assert re.match(name, axis.get_ylabel())
-        planned, measured, _ = (np.asarray(line.get_ydata(), dtype=float) for line in axis.lines)
-        np.testing.assert_allclose(planned, run.force(name, "planned")[:, 2])
-        np.testing.assert_allclose(measured, run.force(name)[:, 2])
-    assert axes[1].get_legend() is None and axes[0].get_legend() is not None
-    plt.close("all")
+    # the same lines
+    assert_allclose(lines[:, :2] / 0.25, np.round(lines[:, :2] / 0.25), atol=1e-3)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from floatbase import Contacts
 from floatbase.robots import Robot, State
@@ -50,7 +51,7 @@ def framed(
     page.goto("about:blank")
 
 
-def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(framed) -> None:
+def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(framed):
     page, inner = framed
     home = inner.evaluate(CAMERA)
     page.mouse.move(450, 500)
@@ -63,7 +64,7 @@ def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(fra
     page.keyboard.up("Control")
     inner.wait_for_function(f"{CAMERA}[0] != {home[0]}")
     inner.evaluate("document.querySelector('#tools button').click()")
-    np.testing.assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
+    assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
     page.mouse.click(450, 500)
     page.mouse.wheel(0, 120)
     inner.wait_for_function(f"{CAMERA}[0] != {home[0]}")
@@ -73,7 +74,7 @@ def test_the_wheel_scrolls_the_page_until_the_reader_clicks_into_the_picture(fra
     page.wait_for_function("scrollY > 60")
 
 
-def test_views_parts_and_keys(framed) -> None:
+def test_views_parts_and_keys(framed):
     page, inner = framed
     home = inner.evaluate(CAMERA)
     inner.evaluate("document.querySelector('#tools details').open = true")
@@ -115,5 +116,5 @@ def test_views_parts_and_keys(framed) -> None:
         )
         assert changes(inner.evaluate(CAMERA)), key
         page.keyboard.press("h")
-        np.testing.assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
+        assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
     assert inner.evaluate("viewer.renderer.domElement.getAttribute('aria-label')") == "go2 standing"

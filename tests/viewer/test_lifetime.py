@@ -13,20 +13,16 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
+import msgpack
 import numpy as np
 import psutil
 import pytest
-import umsgpack
 from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
 from waiting import PATIENCE, until
 
-from floatbase.dynamics import Contacts
-from floatbase.robots import Robot, State
-from floatbase.viewer import Viewer
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.transport.window import Window
 
@@ -53,21 +49,12 @@ def answers(port: int) -> bool:
 
 @pytest.mark.front_end
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium found on the path")
-def test_a_killed_browser_leaves_nothing_behind(
-    viewer: Viewer,
-    go2: Robot,
-    standing: State,
-    contacts: Contacts,
-    forces: np.ndarray,
-    tmp_path: Path,
-) -> None:
+def test_a_killed_browser_leaves_nothing_behind(viewer, go2, standing, contacts, forces, tmp_path):
     viewer.show(standing, contacts, forces)
     address = viewer.url
-    threads, files, entries = (
-        threading.active_count(),
-        len(os.listdir("/proc/self/fd")),
-        len(viewer.window.scene),
-    )
+    threads = threading.active_count()
+    files = len(os.listdir("/proc/self/fd"))
+    entries = len(viewer.window.scene)
     browser = subprocess.Popen(
         [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", address],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
@@ -112,7 +99,7 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(
     window: Window, sleeper: socket.socket
 ) -> None:
-    (_, command) = protocol.set_object("/meshcat/a", umsgpack.packb({"data": "x" * 20_000}))
+    (_, command) = protocol.set_object("/meshcat/a", msgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):
@@ -133,9 +120,7 @@ def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(
     assert not answers(window.port)
 
 
-def test_a_page_that_never_reads_is_dropped(
-    window: Window, sleeper: socket.socket, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     files = len(os.listdir("/proc/self/fd"))
 
@@ -195,7 +180,7 @@ PORTS = (
 
 
 @pytest.mark.front_end
-def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_else() -> None:
+def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_else():
     kernel = Kernel()
     try:
         jupyters = json.loads(kernel.run(PORTS))

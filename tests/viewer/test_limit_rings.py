@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from messages import refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.control import Command, JointLimits
@@ -42,7 +43,7 @@ def rings(paths: Iterable[str]) -> dict[str, str]:
 def owners(command: Command) -> set[str]:
     """Return the joints with an active limit, from the multipliers."""
     ends = ("position limit", "velocity limit")
-    return {label.owner for label in command.active if label.kind.endswith(ends)}  # type: ignore[attr-defined]
+    return {label.owner for label in command.active if label.kind.endswith(ends)}
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +71,7 @@ def stretched(go2: Robot, commands: list[Command]) -> fb.Rollout:
     ("fraction", "is_near"),
     [(-0.01, True), (0.04, True), (0.06, False), (0.5, False), (0.94, False), (0.96, True)],
 )
-def test_a_joint_near_a_limit_has_a_ring(
-    viewer: Viewer, go2: Robot, fraction: float, is_near: bool
-) -> None:
+def test_a_joint_near_a_limit_has_a_ring(viewer, go2, fraction, is_near):
     state = at_fraction(go2, JOINT, fraction)
     viewer.show(state)
     assert rings(viewer.renderer.picture) == ({JOINT: "near_limit"} if is_near else {})
@@ -81,7 +80,7 @@ def test_a_joint_near_a_limit_has_a_ring(
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_ring_is_around_the_axis_of_its_joint(name: str) -> None:
+def test_a_ring_is_around_the_axis_of_its_joint(name):
     robot = load(name)
     with_view = Viewer(robot)
     for joint in robot.joint_names[:7]:
@@ -93,14 +92,12 @@ def test_a_ring_is_around_the_axis_of_its_joint(name: str) -> None:
         before = state.joint_transforms[index]
         axis = pin.log3(turned[:3, :3] @ before[:3, :3].T) / 0.1
         size = np.linalg.norm(matrix[:3, 2])
-        np.testing.assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
-        np.testing.assert_allclose(matrix[:3, 2] / size, axis, atol=1e-6)
+        assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
+        assert_allclose(matrix[:3, 2] / size, axis, atol=1e-6)
     with_view.close()
 
 
-def test_a_ring_is_vermilion_while_the_controllers_limit_is_active(
-    viewer: Viewer, stretched: fb.Rollout, commands: list[Command]
-) -> None:
+def test_a_ring_is_vermilion_while_the_controllers_limit_is_active(viewer, stretched, commands):
     seen = set()
     for i in range(0, len(stretched), 10):
         command = commands[i]
@@ -116,9 +113,7 @@ def test_a_ring_is_vermilion_while_the_controllers_limit_is_active(
     assert seen == {"near_limit", "active_limit"}
 
 
-def test_the_legend_explains_only_rings_that_are_drawn(
-    viewer: Viewer, go2: Robot, stretched: fb.Rollout, commands: list[Command]
-) -> None:
+def test_the_legend_explains_only_rings_that_are_drawn(viewer, go2, stretched, commands):
     def legend() -> set[str]:
         items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
         return {text for _, text, _ in items if "limit" in text}
@@ -137,31 +132,27 @@ def test_the_legend_explains_only_rings_that_are_drawn(
     assert legend() == set()
 
 
-def test_rings_appear_in_a_recording_when_limits_are_active(
-    viewer: Viewer, stretched: fb.Rollout, commands: list[Command]
-) -> None:
+def test_rings_appear_in_a_recording_when_limits_are_active(viewer, stretched, commands):
     viewer.play(stretched, rate=100.0)
     moving, hidden = tracks(viewer), 0
     for joint in {joint for command in commands for joint in owners(command)}:
         times, visible = moving[f"active_limit/{joint}", ".visible"]
         rows = np.round(times / 1e-3).astype(int)
         expected = [joint in owners(commands[i]) for i in rows]
-        np.testing.assert_array_equal(visible[:, 0].astype(bool), expected)
+        assert_array_equal(visible[:, 0].astype(bool), expected)
         hidden += expected.count(False)
     assert hidden
 
 
-def test_a_rollout_has_the_planned_accelerations(
-    go2: Robot, stretched: fb.Rollout, commands: list[Command]
-) -> None:
-    np.testing.assert_array_equal(stretched.planned_qdd, [command.qdd for command in commands])
+def test_a_rollout_has_the_planned_accelerations(go2, stretched, commands):
+    assert_array_equal(stretched.planned_qdd, [command.qdd for command in commands])
     torques = SimpleNamespace(tau=np.zeros(go2.d))
     run = fb.rollout(fb.Simulation(go2), lambda q, v, t: torques, 0.01)
     assert run.planned_qdd is not None and run.planned_qdd.shape == (len(run), go2.nv)
     assert np.isnan(run.planned_qdd).all() and run.joint_limits is None
 
 
-def test_active_rings_follow_the_limits_of_the_controller(viewer: Viewer, go2: Robot) -> None:
+def test_active_rings_follow_the_limits_of_the_controller(viewer, go2):
     standing, contacts = go2.standing(), fb.Contacts.points(go2)
     tasks = [
         fb.CoMTask(standing.com + [0.0, 0.0, 0.05], kp=400.0),
@@ -177,9 +168,7 @@ def test_active_rings_follow_the_limits_of_the_controller(viewer: Viewer, go2: R
         assert drawn == ({"active_limit"} if limits is not None else set())
 
 
-def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(viewer, go2):
     standing, limits = go2.standing(), JointLimits.of(go2)
     upper = limits.upper.copy()
     upper[2] = standing.q[7 + 2] + 0.01
@@ -189,7 +178,7 @@ def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(
     viewer.show(standing, joint_limits=one_sided)
     assert rings(viewer.renderer.picture) == {}
     for wrong, *named in (
-        (lambda: viewer.show(standing, joint_limits="robot"), "joint_limits", "robot"),  # type: ignore[arg-type]
+        (lambda: viewer.show(standing, joint_limits="robot"), "joint_limits", "robot"),
         (lambda: viewer.show(standing, joint_limits=JointLimits.of(load("ur5"))), 6, 12),
         (lambda: viewer.show(standing, qdd=np.zeros(12)), "qdd", 12, 18),
         (lambda: viewer.show(standing, qdd=np.full(18, np.nan)), "qdd", np.nan),

@@ -8,46 +8,49 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
-from pathlib import Path
 from threading import Event
 
 import numpy as np
 import pytest
 from messages import missing
+from numpy.testing import assert_allclose
 from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_connected
 from floatbase.playground import Playground, RealTimeFactor
 from floatbase.robots import Robot, catalogue, load
 
-from .looks import picture
+from .looks import control, eventually, picture
 
 
-def test_the_robots_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_robots_are_listed(capsys):
     assert main(["robots"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(catalogue())
 
 
-def test_a_wrong_name_or_port_is_a_message_not_a_traceback(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
     assert main(["view", "go3", "--no-browser"]) == 2
     assert not missing(capsys.readouterr().err, "go3", "go2")
     assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
     assert not missing(capsys.readouterr().err, "port", 99999)
 
 
-def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file, solo = tmp_path / "mine.urdf", load("solo12")
-    file.write_text(solo.urdf)
+def test_a_urdf_with_a_wrong_foot_or_path_is_a_message(tmp_path, capsys):
+    file = tmp_path / "mine.urdf"
+    file.write_text(load("solo12").urdf)
     assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
     assert "FL_FOTT" in capsys.readouterr().err
     assert main(["view", str(tmp_path / "none.urdf"), "--no-browser"]) == 2
     assert "none.urdf" in capsys.readouterr().err
+
+
+@pytest.mark.front_end
+def test_a_user_defined_urdf_is_shown(tmp_path):
+    file, solo = tmp_path / "mine.urdf", load("solo12")
+    file.write_text(solo.urdf)
     options = ["--feet", *(foot.frame for foot in solo.feet), "--foot-radius", "0.01"]
     command = [sys.executable, "-m", "floatbase", "view", str(file), "--no-browser", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         assert "mine at http://127.0.0.1" in process.stdout.readline()
         process.terminate()
         assert process.wait(timeout=20) == 0
@@ -55,7 +58,7 @@ def test_a_urdf_of_ones_own_is_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
+def test_ctrl_c_ends_it_cleanly(number):
     command = [sys.executable, "-m", "floatbase", "view", "ur5", "--no-browser"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -70,7 +73,7 @@ def test_ctrl_c_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 @pytest.mark.front_end
-def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
+def test_the_robot_waits_for_its_first_page(page, go2):
     with closing(Playground(go2)) as playground, ThreadPoolExecutor(1) as other:
         ended = Event()
         begun = other.submit(start_when_connected, playground, ended)
@@ -85,7 +88,7 @@ def test_the_robot_waits_for_its_first_page(page, go2: Robot) -> None:
             ended.set()
 
 
-def test_the_end_of_the_program_ends_the_wait_for_a_page(go2: Robot) -> None:
+def test_the_end_of_the_program_ends_the_wait_for_a_page(go2):
     ended = Event()
     ended.set()
     with closing(Playground(go2)) as playground:
@@ -101,92 +104,80 @@ def playground(go2: Robot) -> Iterator[Playground]:
     started.close()
 
 
-def test_the_controls_reach_the_robot(page, playground: Playground, go2: Robot) -> None:
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    def control(name: str, call: str) -> None:
-        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
-
+def test_the_controls_reach_the_robot(page, playground, go2):
     def drawn() -> set[str]:
         return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    control("CoM x [m]", "setValue(0.04)")
-    until(
-        lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01, work
+    control(page, "CoM x [cm]", "setValue(4)")
+    eventually(
+        page, lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01
     )
-    control("facets", "setValue(6)")
-    control("friction model", "setValue(0.3)")
-    until(lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9, work)
-    until(
-        lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6), work
+    control(page, "facets", "setValue(6)")
+    control(page, "friction μ model", "setValue(0.3)")
+    eventually(page, lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9)
+    eventually(
+        page, lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6)
     )
     picture(page, "bare_page")
-    control("pause", "fire()")
-    until(lambda: playground.run.status == "paused", work)
+    control(page, "pause", "fire()")
+    eventually(page, lambda: playground.run.status == "paused")
     playground.run.close()  # waits for the last slice
     stopped = playground.session.sim.time
-    control("stand on FL_foot", "setValue(false)")
-    control("run", "fire()")
-    until(lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn(), work)
+    control(page, "lift FL_foot", "setValue(true)")
+    control(page, "run", "fire()")
+    eventually(
+        page, lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn()
+    )
     assert "measured/FR_foot" in drawn()
 
 
 @pytest.mark.front_end
-def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(
-    page, playground: Playground
-) -> None:
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    def control(name: str, call: str) -> None:
-        page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
-
+def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground):
     def place() -> np.ndarray:
         return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
-    control("forwards [m/s]", "setValue(0.5)")
-    control("turn left [rad/s]", "setValue(0.5)")
-    control("gait", "setValue(2)")
-    until(lambda: place()[0] > 0.3, work)
+    control(page, "velocity x [m/s]", "setValue(0.5)")
+    control(page, "yaw rate [rad/s]", "setValue(0.5)")
+    control(page, "gait", "setValue(2)")
+    eventually(page, lambda: place()[0] > 0.3)
     picture(page, "bare_page_walking")
-    control("gait", "setValue(0)")
-    until(
+    control(page, "gait", "setValue(0)")
+    eventually(
+        page,
         lambda: (
             playground.session.last.contacts_at(-1).names
             == tuple(foot.frame for foot in playground.robot.feet)
         ),
-        work,
     )
     stopped = place()
-    control("CoM z [m]", "setValue(-0.02)")  # it stands from now on where it is
-    until(lambda: place()[2] < stopped[2] - 0.01, work)
+    control(page, "CoM z [cm]", "setValue(-2)")  # it stands from now on where it is
+    eventually(page, lambda: place()[2] < stopped[2] - 0.01)
     assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
-    control("gait", "setValue(1)")
-    control("reset", "fire()")
-    until(lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05, work)
+    control(page, "gait", "setValue(1)")
+    control(page, "reset", "fire()")
+    eventually(
+        page, lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05
+    )
 
 
 @pytest.mark.front_end
-def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
-    page, playground: Playground
-) -> None:
+def test_the_page_pushes_where_the_handle_points_and_shows_what_stopped_the_run(page, playground):
     from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
-    page.evaluate("viewer.gui_controllers['towards [°]'].setValue(-90)")
-    page.evaluate("viewer.gui_controllers['push [N]'].setValue(40)")
+    control(page, "towards [°]", "setValue(-90)")
+    control(page, "push [N]", "setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
     arrow = None
     for _ in range(
         8
     ):  # the arrow stays for half a second, in which a busy machine may draw no frame
-        page.evaluate("viewer.gui_controllers['push'].fire()")
+        control(page, "push", "fire()")
         with suppress(PlaywrightTimeoutError):
             # its shape comes with one message, its direction, which is not up, with the next
             turned = f"{drawn}.children.length > 0 && {drawn}.matrix.elements[10] < 0.5"
@@ -194,20 +185,20 @@ def test_the_page_pushes_where_the_handle_points_and_says_what_stopped_it(
             arrow = page.wait_for_function(seen, timeout=4000).json_value()
             break
     assert arrow is not None
-    np.testing.assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
+    assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
     picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
     playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
     page.wait_for_function(
         "document.getElementById('title').textContent.includes('fell: press reset')"
     )
-    page.evaluate("viewer.gui_controllers['reset'].fire()")
+    control(page, "reset", "fire()")
     page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")
     assert playground.run.status == "running"
 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
-def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> None:
+def test_a_window_that_closes_first_stops_the_run(playground):
     until(lambda: playground.session.last is not None)
     playground.view.close()
     until(lambda: playground.run.status != "running")
@@ -215,7 +206,7 @@ def test_a_window_that_closes_first_stops_the_run(playground: Playground) -> Non
     playground.run.close()
 
 
-def test_the_pace_is_simulated_time_over_time() -> None:
+def test_the_pace_is_simulated_time_over_time():
     now = [0.0]
     pace = RealTimeFactor(lambda: now[0])
     for i in range(101):
@@ -231,7 +222,7 @@ def test_the_pace_is_simulated_time_over_time() -> None:
 
 
 @pytest.mark.parametrize("name", ["ur5", "talos"])
-def test_robots_without_point_feet_run_too(name: str) -> None:
+def test_robots_without_point_feet_run_too(name):
     playground = Playground(load(name))
     playground.start()
     until(lambda: playground.session.sim.time >= 0.05)

@@ -6,9 +6,11 @@ import re
 import sys
 from pathlib import Path
 
+import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
 from floatbase.robots import catalogue, load, load_urdf, with_floating_base
@@ -23,7 +25,7 @@ BOX = 0.01
 REACH = 0.03
 
 
-def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
+def test_light_meshes_are_under_400_kb_and_good_triangles():
     for name in catalogue():
         assert (MESHES / f"{name}.npz").stat().st_size < 400_000, name
         for mesh in robot_meshes(load(name)):
@@ -31,10 +33,8 @@ def test_light_meshes_are_under_400_kb_and_good_triangles() -> None:
             assert np.all(np.isfinite(mesh.vertices)), name
 
 
-@pytest.mark.parametrize("name", catalogue())
-def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(
-    name: str,
-) -> None:
+@pytest.mark.parametrize("name", judges.sampled(catalogue(), "go2", "ur5"))
+def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(name):
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
@@ -50,11 +50,11 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
     assert {mesh.joint for mesh in light} == {piece.joint for piece in pieces}
     for mesh in light:
         own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
-        np.testing.assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
-        np.testing.assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
+        assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
+        assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
 
 
-def test_light_meshes_reach_down_to_the_contacts() -> None:
+def test_light_meshes_reach_down_to_the_contacts():
     for name in catalogue():
         robot = load(name)
         if not robot.feet:
@@ -70,13 +70,13 @@ def test_light_meshes_reach_down_to_the_contacts() -> None:
             assert np.linalg.norm(np.vstack(points) - position, axis=1).min() < REACH, name
 
 
-def test_a_robot_outside_the_catalogue_shows_its_own_meshes() -> None:
+def test_a_robot_outside_the_catalogue_shows_its_own_meshes():
     pytest.importorskip("trimesh", reason="other robots' meshes are read with trimesh")
     robot = load("hyq", feet=["lf_foot", "rf_foot", "lh_foot", "rh_foot"])
     assert sum(len(mesh.faces) for mesh in robot_meshes(robot)) > 1000
 
 
-def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch):
     monkeypatch.setitem(sys.modules, "trimesh", None)
     robot = load_urdf(
         load("go2").urdf.replace("package://", "package://unheard/of/"), feet=["RR_foot"]
@@ -88,7 +88,7 @@ def test_a_robot_without_meshes_is_drawn_along_its_tree(monkeypatch: pytest.Monk
     assert np.linalg.norm(calf - foot, axis=1).min() < REACH
 
 
-def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
+def test_light_meshes_belong_to_a_urdf_and_not_to_a_name():
     """Light meshes are found for the same visuals, whatever the name of the robot.
 
     Another name, other masses and legs further apart keep them. Other feet, another joint or
@@ -111,24 +111,23 @@ def test_light_meshes_belong_to_a_urdf_and_not_to_a_name() -> None:
         assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
     ankle = re.sub('"FL_foot_joint"\\s*type="fixed"', '"FL_foot_joint" type="continuous"', urdf)
     walker = load_urdf(re.sub('<axis\\s*xyz="0 0 0"', '<axis xyz="0 1 0"', ankle))
-    assert walker.model.getJointId("FL_foot_joint") in {
-        mesh.joint for mesh in robot_meshes(walker)
-    }  # its foot turns
+    # its foot turns
+    assert walker.model.getJointId("FL_foot_joint") in {mesh.joint for mesh in robot_meshes(walker)}
     other = load_urdf(MESHES.parent / "models" / "cart.urdf", name="go2")
     assert len(robot_meshes(other)) < len(light)
 
 
-def test_the_base_of_a_floating_arm_moves_with_it() -> None:
+def test_the_base_of_a_floating_arm_moves_with_it():
     arm = load("ur5")
     bolted = {mesh.joint: mesh for mesh in robot_meshes(arm)}
     loose = with_floating_base(arm)
     free = {mesh.joint: mesh for mesh in robot_meshes(loose)}
     assert set(free) == {joint + 1 for joint in bolted}
     for joint, mesh in bolted.items():
-        np.testing.assert_array_equal(free[joint + 1].vertices, mesh.vertices)
+        assert_array_equal(free[joint + 1].vertices, mesh.vertices)
 
 
-def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
+def test_parts_of_a_locked_joint_move_with_its_parent():
     arm = load("ur5")
     stiff = load("ur5", locked=["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"])
     meshes = robot_meshes(stiff)
@@ -138,8 +137,5 @@ def test_parts_of_a_locked_joint_move_with_its_parent() -> None:
     )
     home, whole = arm.standing(), robot_meshes(arm)[-1]
     tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
-    np.testing.assert_allclose(
-        tip,
-        home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3),
-        atol=1e-5,
-    )
+    expected = home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3)
+    assert_allclose(tip, expected, atol=1e-5)

@@ -9,8 +9,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
 
 import nbformat
 import numpy as np
@@ -22,7 +20,6 @@ from nbformat.v4 import new_code_cell, new_notebook
 from waiting import until
 
 from floatbase.errors import ViewerError
-from floatbase.robots import State
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.transport.window import Window
@@ -60,6 +57,14 @@ def newest(commands: list[dict]) -> float:
     return float(commands[-1]["matrix"][0])
 
 
+def shown(window: Window, in_cell: bool = False) -> Client:
+    """Return a page that has drawn the first frame."""
+    put(window, 0)
+    client = Client(window.widget("a", 100), in_cell=in_cell)
+    client.commands()
+    return client
+
+
 def draw_for(window: Window, seconds: float) -> int:
     """Draw something new repeatedly; return how often."""
     drawn, until_then = 0, time.monotonic() + seconds
@@ -76,7 +81,7 @@ def frames_of(client: Client) -> int:
     return sum("frame" in client.messages.get()[0] for _ in range(client.messages.qsize()))
 
 
-def test_a_page_that_does_not_answer_gets_two_frames_and_then_the_newest(window: Window) -> None:
+def test_a_page_that_does_not_answer_gets_two_frames_and_then_the_newest(window):
     put(window, 0)
     client = Client(window.widget("a", 100))
     assert client.frame()[0] == 1
@@ -89,10 +94,8 @@ def test_a_page_that_does_not_answer_gets_two_frames_and_then_the_newest(window:
     assert third[0] == 3 and newest(third[1]) == drawn
 
 
-def test_a_page_that_answers_gets_the_pace_and_no_more(window: Window) -> None:
-    put(window, 0)
-    client = Client(window.widget("a", 100))
-    client.commands()
+def test_a_page_that_answers_gets_the_pace_and_no_more(window):
+    client = shown(window)
     until_then, drawn, times = time.monotonic() + 1.0, 0, []
     while time.monotonic() < until_then:
         drawn += 1
@@ -111,7 +114,7 @@ def shell() -> Iterator[InteractiveShell]:
 
 
 @pytest.fixture
-def window_of_shell(shell: InteractiveShell) -> Iterator[Window]:
+def cell_window(shell: InteractiveShell) -> Iterator[Window]:
     with Window() as opened:
         shell.events.trigger("post_run_cell", None)  # the cell that opened it
         yield opened
@@ -125,67 +128,45 @@ def busy(shell: InteractiveShell) -> Iterator[None]:
     shell.events.trigger("post_run_cell", None)
 
 
-def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(
-    shell: InteractiveShell, window_of_shell: Window
-) -> None:
-    window = window_of_shell
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell, cell_window):
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
+        draw_for(cell_window, 1.0)
         frames = frames_of(client)
         assert 4 <= frames <= 1.1 / BLIND + 2
-    put(window, -1)
+    put(cell_window, -1)
     assert client.hears_nothing()  # what is under way has not been answered yet, now that it can be
     client.drawn(1 + frames)
     assert newest(client.commands()) == -1
 
 
-def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(
-    shell: InteractiveShell, window_of_shell: Window
-) -> None:
-    window = window_of_shell
-    put(window, 0)
-    client = Client(window.widget("a", 100))
-    client.commands()
+def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(shell, cell_window):
+    client = shown(cell_window)
     with busy(shell):
-        draw_for(window, 0.5)
+        draw_for(cell_window, 0.5)
         assert frames_of(client) == 2
 
 
-def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(
-    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    window = window_of_shell
+def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(shell, cell_window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.MAX_UNANSWERED", 1000)
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
+        draw_for(cell_window, 1.0)
         assert 2 <= frames_of(client) <= 10  # of 119 bytes each
 
 
-def test_a_long_cell_does_not_make_a_page_look_lost(
-    shell: InteractiveShell, window_of_shell: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    window = window_of_shell
+def test_a_long_cell_does_not_make_a_page_look_lost(shell, cell_window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.4)
-    put(window, 0)
-    client = Client(window.widget("a", 100), in_cell=True)
-    client.commands()
+    client = shown(cell_window, in_cell=True)
     with busy(shell):
-        draw_for(window, 1.0)
-    put(window, -1)
+        draw_for(cell_window, 1.0)
+    put(cell_window, -1)
     frames = frames_of(client)
     client.drawn(1 + frames)
-    assert newest(client.commands()) == -1 and window.n_pages == 1
+    assert newest(client.commands()) == -1 and cell_window.n_pages == 1
 
 
-def test_a_page_that_is_let_go_is_told_and_comes_back(
-    window: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     put(window, 0)
     client = Client(window.widget("a", 100))
@@ -206,7 +187,7 @@ def test_a_page_that_is_let_go_is_told_and_comes_back(
     until(lambda: window.n_pages == 0)
 
 
-def test_a_newer_display_retires_the_one_before_which_shows_its_image(window: Window) -> None:
+def test_a_newer_display_retires_the_one_before_which_shows_its_image(window):
     put(window, 1)
     first = window.widget("a", 100, b"png")
     client = Client(first)
@@ -220,16 +201,14 @@ def test_a_newer_display_retires_the_one_before_which_shows_its_image(window: Wi
     assert newest(Client(second).commands()) == 2.0
 
 
-def test_a_display_without_its_package_names_the_extra(
-    window: Window, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_display_without_its_package_names_the_extra(window, monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
     monkeypatch.delitem(sys.modules, "floatbase.viewer.transport.notebook_widget")
     with raises(ViewerError, "anywidget", "floatbase[viewer]"):
         window.widget("a", 100)
 
 
-def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) -> None:
+def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window):
     client = Client(window.widget("a", 100), hello=False)
     client.say("code")
     content, (html, viewer) = client.message()
@@ -239,9 +218,7 @@ def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window: Window) ->
     assert window.n_pages == 0
 
 
-def test_what_no_page_of_a_notebook_says_is_ignored(
-    window: Window, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_unknown_messages_of_a_notebook_page_are_ignored(window, caplog):
     put(window, 1)
     widget = window.widget("a", 100)
     client = Client(widget)
@@ -267,14 +244,14 @@ def test_what_no_page_of_a_notebook_says_is_ignored(
     assert not [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
 
 
-def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window: Window) -> None:
+def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window):
     widget = window.widget("a", 100)
     for i in range(60):
         Client(widget, f"page {i}")
     until(lambda: window.n_pages == 50)
 
 
-def test_a_closed_window_says_so_to_its_pages_once_and_to_those_that_ask(window: Window) -> None:
+def test_a_closed_window_informs_its_pages_once_and_new_ones_on_request(window):
     widget = window.widget("a", 100)
     put(window, 1)
     client = Client(widget)
@@ -298,8 +275,8 @@ def notebook(page) -> Iterator[Notebook]:
 
 @pytest.mark.front_end
 def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
-    notebook: Notebook, page: Any, standing: State
-) -> None:
+    notebook, page, standing
+):
     viewer, *others = (Viewer(standing.robot, height=100) for _ in range(3))
     viewer.show(standing)
     frames = [notebook.show(page, view.widget()) for view in (viewer, *others)]
@@ -320,9 +297,7 @@ def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_
 
 
 @pytest.mark.front_end
-def test_an_earlier_output_shows_its_image_and_the_newest_is_live(
-    notebook: Notebook, page: Any, standing: State
-) -> None:
+def test_an_earlier_output_shows_its_image_and_the_newest_is_live(notebook, page, standing):
     viewer = Viewer(standing.robot, height=170)  # so that both outputs are in sight
     first = notebook.show(page, viewer.show(standing).widget())
     first.wait_for_function(DRAWN)
@@ -339,9 +314,7 @@ def test_an_earlier_output_shows_its_image_and_the_newest_is_live(
 
 
 @pytest.mark.front_end
-def test_many_displays_share_the_few_contexts_that_a_browser_has(
-    notebook: Notebook, page: Any, standing: State
-) -> None:
+def test_many_displays_share_the_few_contexts_that_a_browser_has(notebook, page, standing):
     page.set_viewport_size({"width": 450, "height": 200})
     views = [Viewer(standing.robot, height=170).show(standing) for _ in range(CONTEXTS + 2)]
     for view in views:
@@ -368,8 +341,8 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(
 
 @pytest.mark.front_end
 def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
-    notebook: Notebook, page: Any, viewer: Viewer, standing: State
-) -> None:
+    notebook, page, viewer, standing
+):
     viewer.show(standing)
     frame = notebook.show(page, viewer.widget())
     frame.wait_for_function(DRAWN)
@@ -390,8 +363,8 @@ def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes
 
 @pytest.mark.parametrize(("address", "reached"), [("", True), ("sealed", False)])
 def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
-    notebook: Notebook, page: Any, viewer: Viewer, standing: State, address: str, reached: bool
-) -> None:
+    notebook, page, viewer, standing, address, reached
+):
     page.goto(f"{notebook.url}{address}")
     page.wait_for_function("window.started")
     page.evaluate(COUNTED)
@@ -406,9 +379,9 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
-def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
-    notebook: Notebook, page: Any, viewer: Viewer, standing: State, how: str
-) -> None:
+def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_has_gone(
+    notebook, page, viewer, standing, how
+):
     viewer.show(standing)
     frame = notebook.show(page, viewer.widget())
     frame.wait_for_function(DRAWN)
@@ -420,20 +393,18 @@ def test_a_picture_stays_when_its_kernel_or_its_window_has_gone_and_says_so(
     picture(page, f"notebook_without_{how}")
 
 
-def test_an_output_has_the_widget_and_an_image_or_when_asked_the_scene(
-    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
+    viewer, standing, monkeypatch
+):
     viewer.show(standing)
     data, _ = viewer._repr_mimebundle_()
     assert set(data) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}
     assert data["text/plain"] == repr(viewer)
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     shown = viewer._repr_mimebundle_()
-    assert (
-        set(shown) == {"text/html"}
-        and "srcdoc=" in shown["text/html"]
-        and viewer.url not in shown["text/html"]
-    )
+    assert set(shown) == {"text/html"}
+    assert "srcdoc=" in shown["text/html"]
+    assert viewer.url not in shown["text/html"]
     monkeypatch.delenv("FLOATBASE_VIEWER")
     viewer.close()
     assert set(viewer._repr_mimebundle_()) == {"text/html"}
@@ -457,7 +428,7 @@ push_panel(live_run(sim, controller, third), third)""",
 
 
 @pytest.mark.front_end
-def test_a_saved_notebook_shows_every_picture_as_html(tmp_path: Path) -> None:
+def test_a_saved_notebook_shows_every_picture_as_html(tmp_path):
     saved = NotebookClient(
         new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120
     ).execute()

@@ -14,16 +14,10 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
-from floatbase.playground import (
-    CHALLENGES,
-    Playground,
-    Settings,
-    mean_force_error,
-    playground,
-)
+from floatbase.playground import CHALLENGES, Playground, Settings, mean_force_error, playground
 from floatbase.robots import Robot
 
-from .looks import picture
+from .looks import control, eventually, picture
 
 pytestmark = pytest.mark.front_end
 
@@ -49,7 +43,7 @@ def opened(page, field: Playground) -> None:
     page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")
 
 
-def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> None:
+def test_every_control_can_be_moved_to_both_ends(page, field):
     opened(page, field)
     page.evaluate(ENDS)
     for count in ("#panel input[type=checkbox]", "#board button", "#panel .buttons button"):
@@ -68,21 +62,18 @@ def test_every_control_can_be_moved_to_both_ends(page, field: Playground) -> Non
             page.locator("#panel select").nth(number).select_option(str(option), force=True)
             page.wait_for_timeout(30)
     picture(page, "playground_ends")
-    page.evaluate("viewer.gui_controllers['challenge'].setValue(0)")
-    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
-    until(
-        lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0,
-        lambda: page.wait_for_timeout(20),
-    )
+    control(page, "challenge", "setValue(0)")
+    control(page, "reset everything", "fire()")
+    eventually(page, lambda: field.run.status == "running" and 0.3 < field.session.sim.time < 30.0)
     assert field.session.settings.friction == (0.7, 0.7) and field.session.refusal == ""
     said = page.evaluate(
         "[...document.querySelectorAll('#panel .row.pair output')].map((one) => one.textContent)"
     )
     assert said[:2] == ["0.70", "0.70"] and said[-2:] == ["ideal", "ideal"]
-    page.wait_for_function("viewer.gui_controllers['friction model'].getValue() == 0.7")
+    page.wait_for_function("viewer.gui_controllers['friction μ model'].getValue() == 0.7")
 
 
-def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> None:
+def test_the_push_slider_pushes_when_it_is_released(page, field):
     opened(page, field)
     box = page.locator("input[aria-label='push [N]']").bounding_box()
     y = box["y"] + 0.5 * box["height"]
@@ -92,15 +83,15 @@ def test_the_push_slider_pushes_when_it_is_released(page, field: Playground) -> 
     page.wait_for_timeout(300)
     assert field.last_push is None
     page.mouse.up()
-    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.last_push is not None)
     assert field.last_push.force[0] == field.force > 0.0
     field.last_push = None
-    page.evaluate("viewer.gui_controllers['push [N]'].setValue(0)")
-    until(lambda: field.force == 0.0, lambda: page.wait_for_timeout(20))
+    control(page, "push [N]", "setValue(0)")
+    eventually(page, lambda: field.force == 0.0)
     assert field.last_push is None
 
 
-def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) -> None:
+def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field):
     opened(page, field)
     page.wait_for_timeout(500)
     # the middle of the base on the page, and the same point moved in the direction of +y
@@ -123,15 +114,13 @@ def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field: Playground) 
     assert field.last_push is None
     page.mouse.up()
     page.keyboard.up("Shift")
-    until(lambda: field.last_push is not None, lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.last_push is not None)
     assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
     assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)
 
 
 @pytest.mark.parametrize("size", [(1200, 700), (390, 780)])
-def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
-    page, field: Playground, size: tuple[int, int]
-) -> None:
+def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(page, field, size):
     page.set_viewport_size({"width": size[0], "height": size[1]})
     opened(page, field)
     assert "Push the robot" in page.evaluate(
@@ -146,48 +135,45 @@ def test_the_buttons_stay_visible_in_a_panel_that_is_scrolled(
         }).map((one) => one.textContent)"""
         assert page.evaluate(hidden) == []
     page.locator("#panel .head button", has_text="pause").click()
-    until(lambda: field.run.status == "paused", lambda: page.wait_for_timeout(20))
+    eventually(page, lambda: field.run.status == "paused")
 
 
-def test_a_challenge_is_started_and_solved(page, field: Playground) -> None:
+def test_a_challenge_is_started_and_solved(page, field):
     number = next(
         i for i, challenge in enumerate(CHALLENGES) if challenge.title == "How many facets?"
     )
     opened(page, field)
-    page.evaluate(f"viewer.gui_controllers['challenge'].setValue({number + 1})")
+    control(page, "challenge", f"setValue({number + 1})")
     page.wait_for_function(
         "document.getElementById('panel').textContent.includes('4 facets: the weakest')"
     )
-    page.evaluate("viewer.gui_controllers['facets'].setValue(13)")
+    control(page, "facets", "setValue(13)")
     page.wait_for_function("document.getElementById('panel').textContent.includes('Solved')")
     assert "facets=13" in page.evaluate("document.querySelector('#panel pre').textContent")
     picture(page, "playground_solved")
 
 
-def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field: Playground) -> None:
+def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field):
     """The plan lacks 0.5 m g. The CoM task makes up for it at an error of 0.5 g / kp = 49 mm."""
     opened(page, field)
 
     def sunk() -> float:
         return float(field.robot.standing().com[2] - field.session.sim.state.com[2])
 
-    def work() -> None:
-        page.wait_for_timeout(20)
-
-    page.evaluate("viewer.gui_controllers['mass [×] reality'].setValue(1.5)")
-    until(lambda: abs(sunk() - 0.049) < 0.01, work)
+    control(page, "mass [%] reality", "setValue(150)")
+    eventually(page, lambda: abs(sunk() - 0.049) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel pre').textContent.includes('Perturbation(mass=1.5)')"
     )
-    page.evaluate("viewer.gui_controllers['mass [×] model'].setValue(1.5)")
-    until(lambda: abs(sunk()) < 0.01, work)
+    control(page, "mass [%] model", "setValue(150)")
+    eventually(page, lambda: abs(sunk()) < 0.01)
     page.wait_for_function(
         "document.querySelector('#panel p.plot').textContent.includes('difference between')"
     )
     assert mean_force_error(field.session.last) < 0.5 * field.robot.weight
 
 
-def test_a_notebook_shows_and_runs_the_playground() -> None:
+def test_a_notebook_shows_and_runs_the_playground():
     shown = playground("solo12")
     try:
         assert "image/png" in shown._repr_mimebundle_()[0]
@@ -197,7 +183,7 @@ def test_a_notebook_shows_and_runs_the_playground() -> None:
         shown.close()
 
 
-def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None:
+def test_a_push_after_a_fall_is_seen_by_the_new_judge(field):
     """The push puts the robot back on its feet, which starts a new judge."""
     field.start_challenge(
         next(challenge for challenge in CHALLENGES if challenge.title == "The weakest side")
@@ -209,7 +195,7 @@ def test_a_push_after_a_fall_is_seen_by_the_new_judge(field: Playground) -> None
         until(lambda seen=size: f"{0.1 * seen:.1f} N·s toppled" in field.judge.message)
 
 
-def test_challenges_can_be_changed_during_a_run(field: Playground) -> None:
+def test_challenges_can_be_changed_during_a_run(field):
     for challenge in (CHALLENGES[0], None, *CHALLENGES[6:9], None):
         field.start_challenge(challenge)
         before = field.session.sim.time
@@ -219,7 +205,7 @@ def test_challenges_can_be_changed_during_a_run(field: Playground) -> None:
     assert field.run.error is None
 
 
-def test_a_paused_challenge_continues_with_run(field: Playground) -> None:
+def test_a_paused_challenge_continues_with_run(field):
     number, challenge = next(
         (i, challenge) for i, challenge in enumerate(CHALLENGES) if challenge.paused
     )
@@ -235,9 +221,7 @@ def test_a_paused_challenge_continues_with_run(field: Playground) -> None:
     until(lambda: field.session.sim.time > 0.2)
 
 
-def test_reset_everything_includes_the_push_the_speed_and_the_terms(
-    page, field: Playground
-) -> None:
+def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field):
     first = (field.force, field.towards)
     controls = ("speed", "push [N]", "show forces", "show gravity")
 
@@ -257,28 +241,18 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(
         ("show forces", "false"),
         ("show gravity", "true"),
     ):
-        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-    until(
-        lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old],
-        lambda: page.wait_for_timeout(20),
+        control(page, name, f"setValue({value})")
+    eventually(
+        page, lambda: not [one for one, old in zip(shown(), before, strict=True) if one == old]
     )
-    until(
-        lambda: "term gravity/m g" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
-    )
-    page.evaluate("viewer.gui_controllers['reset everything'].fire()")
-    until(
-        lambda: shown() == before and (field.force, field.towards) == first,
-        lambda: page.wait_for_timeout(20),
-    )
-    until(
-        lambda: "measured/FL_foot" in field.view.renderer.picture, lambda: page.wait_for_timeout(20)
-    )
+    eventually(page, lambda: "term gravity/m g" in field.view.renderer.picture)
+    control(page, "reset everything", "fire()")
+    eventually(page, lambda: shown() == before and (field.force, field.towards) == first)
+    eventually(page, lambda: "measured/FL_foot" in field.view.renderer.picture)
     assert "term gravity/m g" not in field.view.renderer.picture
 
 
-def test_an_unknown_setting_is_refused_and_the_run_continues(
-    field: Playground,
-) -> None:
+def test_an_unknown_setting_is_refused_and_the_run_continues(field):
     with raises(UnknownNameError, "frction"):
         field.set(frction=(0.5, 0.5))
     field.run.pause()
@@ -286,7 +260,7 @@ def test_an_unknown_setting_is_refused_and_the_run_continues(
     assert field.session.settings.facets == 6 and field.run.status == "paused"
 
 
-def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
+def test_undo_restores_the_settings_before_the_last_change(go2):
     """Steps of one drag are one change, and a refused change is none."""
     paused = Playground(go2)
     try:
@@ -309,54 +283,47 @@ def test_undo_restores_the_settings_before_the_last_change(go2: Robot) -> None:
         paused.close()
 
 
-def test_ctrl_z_undoes_a_change_of_the_page(page, field: Playground) -> None:
+def test_ctrl_z_undoes_a_change_of_the_page(page, field):
     opened(page, field)
-    for keys, name, value in (("Control+z", "facets", 7), (None, "friction reality", 0.3)):
+    for keys, name, value in (("Control+z", "facets", 7), (None, "friction μ reality", 0.3)):
         before = page.evaluate(f"viewer.gui_controllers['{name}'].getValue()")
-        page.evaluate(f"viewer.gui_controllers['{name}'].setValue({value})")
-        until(
-            lambda: field.session.settings != Settings(),
-            lambda: page.wait_for_timeout(20),
-        )
+        control(page, name, f"setValue({value})")
+        eventually(page, lambda: field.session.settings != Settings())
         if keys:
             page.keyboard.press(keys)
         else:
             page.locator("#panel button", has_text="undo").click()
-        until(
-            lambda: field.session.settings == Settings(),
-            lambda: page.wait_for_timeout(20),
-        )
+        eventually(page, lambda: field.session.settings == Settings())
         page.wait_for_function(f"viewer.gui_controllers['{name}'].getValue() == {before}")
 
 
-def test_the_address_has_the_settings_and_sets_them(page, field: Playground) -> None:
+def test_the_address_has_the_settings_and_sets_them(page, field):
     opened(page, field)
     assert page.evaluate("location.hash") == ""
-    page.evaluate("viewer.gui_controllers['facets'].setValue(7)")
-    page.evaluate("viewer.gui_controllers['stand on FL_foot'].setValue(false)")
-    page.evaluate("viewer.gui_controllers['speed'].setValue(0.5)")
-    page.wait_for_function("location.hash == '#stand+on+FL_foot=off&facets=7'")
-    page.evaluate("viewer.gui_controllers['undo'].fire()")
+    control(page, "facets", "setValue(7)")
+    control(page, "lift FL_foot", "setValue(true)")
+    control(page, "speed", "setValue(0.5)")
+    page.wait_for_function("location.hash == '#lift+FL_foot=on&facets=7'")
+    control(page, "undo", "fire()")
     page.wait_for_function("location.hash == '#facets=7'")
 
     page.goto("about:blank")
     page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
-    until(
+    eventually(
+        page,
         lambda: (
             field.session.settings.gait == "trot" and field.session.settings.friction == (0.7, 0.3)
         ),
-        lambda: page.wait_for_timeout(20),
     )
     page.wait_for_timeout(1500)  # until the page has written its own address
     page.evaluate("location.hash = '#facets=5'")
-    until(
-        lambda: field.session.settings.facets == 5 and field.session.settings.gait is None,
-        lambda: page.wait_for_timeout(20),
+    eventually(
+        page, lambda: field.session.settings.facets == 5 and field.session.settings.gait is None
     )
     assert field.session.settings.friction == (0.7, 0.7)
 
 
-def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
+def test_wrong_arguments_raise_our_own_errors(field):
     force = field.force
     with raises(InputError, "robot", 5):
         playground(5)
@@ -376,9 +343,7 @@ def test_wrong_arguments_raise_our_own_errors(field: Playground) -> None:
     assert field.force == force and field.challenge is None
 
 
-def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(
-    go2: Robot,
-) -> None:
+def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_was(go2):
     """The physics accepts a slope of 89°, but the picture does not."""
     paused = Playground(go2)
     try:
@@ -398,7 +363,7 @@ def test_a_ground_that_cannot_be_drawn_is_refused_and_leaves_everything_as_it_wa
         paused.close()
 
 
-def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: Playground) -> None:
+def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field):
     field.set(gait="trot", actual_off=("gravity",))
     until(lambda: field.run.status == "fell")
     until(lambda: field.outcome.startswith("left the ground"))
@@ -409,7 +374,7 @@ def test_without_gravity_the_robot_leaves_the_ground_instead_of_falling(field: P
     until(lambda: field.outcome.startswith("fell"))
 
 
-def test_reset_everything_works_for_an_arm() -> None:
+def test_reset_everything_works_for_an_arm():
     arm = Playground(fb.load("ur5"))
     try:
         arm.start().reset_all()
@@ -419,7 +384,7 @@ def test_reset_everything_works_for_an_arm() -> None:
         arm.close()
 
 
-def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field: Playground) -> None:
+def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field):
     page.set_viewport_size({"width": 390, "height": 844})
     opened(page, field)
     page.wait_for_function("viewer.camera.zoom > 0.3 && viewer.camera.zoom < 1")
@@ -427,13 +392,12 @@ def test_on_a_phone_the_panel_is_below_the_visible_robot(page, field: Playground
     picture(page, "playground_phone")
 
 
-def test_the_actual_slope_is_drawn(field: Playground) -> None:
+def test_the_actual_slope_is_drawn(field):
     field.set(slope=(0.0, 20.0))
     until(
         lambda: (
             field.session.settings.slope == (0.0, 20.0) and field.view.painter.ground is not None
         )
     )
-    until(
-        lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3
-    )  # sin 20°: it rises forwards
+    # sin 20°: it rises forwards
+    until(lambda: abs(field.view.painter.ground.normal[0] + 0.342) < 1e-3)

@@ -6,24 +6,21 @@ import dataclasses
 import re
 from contextlib import closing
 from typing import Any
+from unittest.mock import Mock
 
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from messages import raises, refused
+from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
-from floatbase.robots import Robot, State, catalogue, load
+from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
-from floatbase.viewer.scene.colours import (
-    ALARM,
-    CALM,
-    IDLE,
-    WARNING,
-)
+from floatbase.viewer.scene.colours import ALARM, CALM, IDLE, WARNING
 
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
@@ -54,21 +51,17 @@ def material(viewer: Viewer, path: str) -> dict[str, Any]:
     return viewer.window.scene.commands()[path, "set_object", ""]["object"]["materials"][0]
 
 
-def test_every_joint_is_where_the_state_says(viewer: Viewer, go2: Robot) -> None:
+def test_every_joint_is_where_the_state_says(viewer, go2):
     state = go2.random_state(3)
     viewer.show(state)
     placed = matrices(viewer, "/meshcat/robot/")
     assert len(placed) == go2.model.njoints - 1
     for name, matrix in placed.items():
-        np.testing.assert_allclose(
-            matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6
-        )
+        assert_allclose(matrix, state.joint_transforms[go2.model.getJointId(name)], atol=1e-6)
 
 
 @pytest.mark.parametrize("factor", [0.02, 1.0, 7.0])
-def test_arrows_start_at_contacts(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray, factor: float
-) -> None:
+def test_arrows_start_at_contacts(viewer, standing, contacts, forces, factor):
     viewer.show(standing, contacts, forces=factor * forces, planned=0.5 * factor * forces)
     for kind, share in (("measured", 1.0), ("planned", 0.5)):
         arrows = matrices(viewer, f"/meshcat/{kind}/")
@@ -76,17 +69,16 @@ def test_arrows_start_at_contacts(
         for matrix, force, position in zip(
             arrows.values(), forces, contacts.positions(standing), strict=True
         ):
-            np.testing.assert_allclose(
-                matrix[:3, 2], viewer.scale * factor * share * force, rtol=1e-5, atol=1e-6
-            )
-            np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+            expected = viewer.scale * factor * share * force
+            assert_allclose(matrix[:3, 2], expected, rtol=1e-5, atol=1e-6)
+            assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
 @pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
 def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
-    viewer: Viewer, go2: Robot, standing: State, normal: tuple[float, ...], mu: float
-) -> None:
+    viewer, go2, standing, normal, mu
+):
     contacts = Contacts.points(go2, mu=mu, normals=normal)
     viewer.show(standing, contacts)
     cones = matrices(viewer, "/meshcat/cone/")
@@ -94,15 +86,12 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
     for matrix, position in zip(cones.values(), contacts.positions(standing), strict=True):
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across / along == pytest.approx(mu, rel=1e-5)
-        np.testing.assert_allclose(
-            matrix[:3, 2] / along, np.asarray(normal) / np.linalg.norm(normal), atol=1e-6
-        )
-        np.testing.assert_allclose(matrix[:3, 3], position, atol=1e-6)
+        expected = np.asarray(normal) / np.linalg.norm(normal)
+        assert_allclose(matrix[:3, 2] / along, expected, atol=1e-6)
+        assert_allclose(matrix[:3, 3], position, atol=1e-6)
 
 
-def test_the_colour_of_a_cone_shows_where_its_force_is(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_the_colour_of_a_cone_shows_where_its_force_is(viewer, standing, contacts, forces):
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
     for shown in (
         {"forces": forces},
@@ -116,9 +105,7 @@ def test_the_colour_of_a_cone_shows_where_its_force_is(
 
 
 @pytest.mark.parametrize("facets", [None, 4])
-def test_a_cone_without_a_force_is_grey_and_faint(
-    go2: Robot, standing: State, contacts: Contacts, forces: np.ndarray, facets: int | None
-) -> None:
+def test_a_cone_without_a_force_is_grey_and_faint(go2, standing, contacts, forces, facets):
     viewer = Viewer(go2, facets=facets)
     names = contacts.point_names
 
@@ -133,9 +120,8 @@ def test_a_cone_without_a_force_is_grey_and_faint(
     viewer.show(standing, contacts)
     assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
     up = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
-    viewer.show(
-        standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]]
-    )  # the second in the air, the third all but
+    # the second in the air, the third all but
+    viewer.show(standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]])
     assert [looks()[name][:3] for name in names] == [list(CALM), list(IDLE), list(IDLE), list(CALM)]
     assert looks()[names[1]][3] < 0.5 * looks()[names[0]][3]
     viewer.show(standing, contacts, forces=0 * up, planned=up)  # what is measured counts
@@ -150,9 +136,7 @@ def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("height", [0.0, 0.3])
-def test_the_ground_lies_under_the_contacts_of_a_slope(
-    viewer: Viewer, go2: Robot, height: float
-) -> None:
+def test_the_ground_lies_under_the_contacts_of_a_slope(viewer, go2, height):
     slope = np.array([0.3, -0.15, 1.0]) / np.linalg.norm([0.3, -0.15, 1.0])
     state = Simulation(go2, Ground(normal=slope)).state
     q = state.q.copy()
@@ -160,7 +144,7 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(
     state, contacts = State(go2, q), Contacts.points(go2, normals=slope)
     viewer.show(state, contacts, support=True)
     normal, point = normal_and_point(viewer)
-    np.testing.assert_allclose(normal, slope, atol=1e-6)
+    assert_allclose(normal, slope, atol=1e-6)
     for position in (
         *contacts.positions(state),
         matrices(viewer, "/meshcat/com/")["projection"][:3, 3],
@@ -174,7 +158,7 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(
         assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
 
 
-def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing: State) -> None:
+def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2, standing):
     slope = np.array([0.6, 0.0, 0.8])
     ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
     viewer = Viewer(go2)
@@ -185,19 +169,18 @@ def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2: Robot, standing
         Contacts.points(go2, normals=[1, 0, 0]),
     ):
         viewer.show(standing, contacts)
-        np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
-    viewer.show(
-        standing, Contacts.points(go2, normals=slope)
-    )  # a slope that the feet do not stand on
-    np.testing.assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+        assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
+    # a slope that the feet do not stand on
+    viewer.show(standing, Contacts.points(go2, normals=slope))
+    assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
     viewer.close()
     viewer = Viewer(go2, ground=slope)
     viewer.show(standing, Contacts.points(go2))
-    np.testing.assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
+    assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
     viewer.close()
 
 
-def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> None:
+def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2):
     ground = Ground(normal=[[0.0, -0.4, 1.0], [0.1, 0.4, 1.0]], offset=[0.1, 0.0])
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
@@ -206,19 +189,17 @@ def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2: Robot) -> 
     points = item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
     points = np.frombuffer(points, "<f4").reshape(-1, 3)
     clearances = ground.clearances(points)
-    np.testing.assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
+    assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
     assert np.all(np.sum(clearances < 1e-5, axis=0) > 1000)
     shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
-    np.testing.assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
+    assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
     assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
     viewer.close()
     with raises(InputError, "ground"):
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
-def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(
-    go2: Robot,
-) -> None:
+def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(go2):
     ground = Ground.stairs(2, 0.1, start=0.0, width=1.0)
     state = Simulation(go2, ground).state
     viewer = Viewer(go2, ground=ground)
@@ -242,9 +223,7 @@ def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_
     viewer.close()
 
 
-def test_polyhedra_highlight_their_active_facets(
-    go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_polyhedra_highlight_their_active_facets(go2, standing, contacts):
     viewer = Viewer(go2, facets=4)
     force = np.tile([0.0, 0.0, 40.0], (4, 1))
     force[0, 0] = 40 * 0.6 * np.cos(np.pi / 4)  # facet 0 looks along x
@@ -262,9 +241,7 @@ def test_polyhedra_highlight_their_active_facets(
     viewer.close()
 
 
-def test_only_given_items_are_drawn(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_only_given_items_are_drawn(viewer, standing, contacts, forces):
     viewer.show(standing, com=False)
     bare = paths(viewer)
     viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
@@ -275,33 +252,26 @@ def test_only_given_items_are_drawn(
     assert any(path.endswith("/rim") for path in full)  # of the foot whose force is outside
     assert any("/com/" in path for path in full - bare)
     viewer.show(standing, contacts.only("FL_foot"), forces=forces[0], com=False, cones=False)
-    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == {
-        "/meshcat/measured/FL_foot",
-        "/meshcat/patch/FL_foot",
-    }
+    expected = {"/meshcat/measured/FL_foot", "/meshcat/patch/FL_foot"}
+    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == expected
     viewer.show(standing, com=False)
     assert paths(viewer) == bare
     assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""
 
 
-def test_showing_twice_sends_nothing(
-    viewer: Viewer, go2: Robot, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_showing_twice_sends_nothing(viewer, go2, contacts, forces):
     viewer.show(go2.standing(), contacts, forces=forces, title="twice")
     newest = viewer.window.scene.newest
     viewer.show(go2.standing(), contacts, forces=forces.ravel(), title="twice")
     assert viewer.window.scene.newest == newest
 
 
-def test_a_change_sends_only_what_changed(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_a_change_sends_only_what_changed(viewer, standing, contacts, forces):
     viewer.show(standing, contacts, forces=forces)
     newest = viewer.window.scene.newest
     viewer.show(standing, contacts, forces=forces + [[0, 0, 1.0]] + 0 * forces)
-    assert (
-        viewer.window.scene.newest - newest == 4 + 2
-    )  # four arrows, a cone that is no longer on its surface, and its entry in the legend
+    # four arrows, a cone that is no longer on its surface, and its entry in the legend
+    assert viewer.window.scene.newest - newest == 4 + 2
 
 
 # the same few paths in many spellings, some below others
@@ -325,14 +295,13 @@ def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
         return viewer.window.scene.commands()
 
 
+@settings(max_examples=30)
 @given(st.lists(st.dictionaries(PATHS, ITEMS, max_size=4), min_size=1, max_size=4))
-def test_a_scene_shows_the_last_picture_however_paths_are_spelt(
-    pictures: list[Picture],
-) -> None:
+def test_a_scene_shows_the_last_picture_however_paths_are_spelt(pictures):
     assert scene_after(pictures) == scene_after(pictures[-1:])
 
 
-def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> None:
+def test_a_path_without_a_name_is_refused(viewer, standing):
     viewer.show(standing)
     before = viewer.window.scene.commands()
     for path in ("", "/", "//"):
@@ -341,28 +310,20 @@ def test_a_path_without_a_name_is_refused(viewer: Viewer, standing: State) -> No
     assert viewer.window.scene.commands() == before
 
 
-def test_an_interrupted_picture_is_drawn_again(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_an_interrupted_picture_is_drawn_again(viewer, standing, contacts, monkeypatch):
     viewer.show(standing)
-    put, viewer.window.put = (
-        viewer.window.put,
-        lambda updates: (_ for _ in ()).throw(KeyboardInterrupt),
-    )  # type: ignore
-    with pytest.raises(KeyboardInterrupt):
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(viewer.window, "put", Mock(side_effect=KeyboardInterrupt))
         viewer.show(standing, contacts)
-    viewer.window.put = put  # type: ignore[method-assign]
     viewer.show(standing)
     assert not any("/cone/" in path for path in paths(viewer))
     assert "/meshcat/robot/root_joint" in paths(viewer)
 
 
-def test_the_scale_bar_is_as_long_as_the_force_on_its_label(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer, standing, contacts):
     viewer.show(standing, contacts)
     label = viewer.painter.picture(standing, contacts)["scale/label"].shape.name
-    force = float(re.fullmatch(r"([\d.]+) N", label)[1])  # type: ignore[index]
+    force = float(re.fullmatch(r"([\d.]+) N", label)[1])
     assert np.linalg.norm(matrices(viewer, "/meshcat/scale/bar")[""][:3, 2]) == pytest.approx(
         viewer.scale * force, rel=1e-5
     )
@@ -372,23 +333,11 @@ def legend(viewer: Viewer) -> list[str]:
     return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
-def test_the_legend_explains_what_is_shown(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
-    viewer.show(
-        standing,
-        contacts,
-        forces,
-        planned=forces,
-        support=True,
-        push=("base", [0, 30.0, 0]),
-        ghost=standing,
-    )
-    cone = [
-        "friction cone: force inside",
-        "friction cone: surface reached",
-        "friction cone: force outside (rim)",
-    ]
+def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
+    everything = {"planned": forces, "support": True, "ghost": standing}
+    viewer.show(standing, contacts, forces, push=("base", [0, 30.0, 0]), **everything)
+    kinds = ("force inside", "surface reached", "force outside (rim)")
+    cone = [f"friction cone: {kind}" for kind in kinds]
     assert legend(viewer) == [
         "measured force", "planned force", "centre of mass", "push", *cone, "support polygon",
         "desired posture",
@@ -410,26 +359,19 @@ def test_the_legend_explains_what_is_shown(
     assert legend(viewer) == []
 
 
-def test_forces_that_are_not_drawn_still_colour_their_cones(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+def test_forces_that_are_not_drawn_still_colour_their_cones(viewer, standing, contacts, forces):
     def cones() -> dict:
-        return {
-            path: item.colour
-            for path, item in viewer.renderer.picture.items()
-            if path.startswith("cone/")
-        }
+        items = viewer.renderer.picture.items()
+        return {path: item.colour for path, item in items if path.startswith("cone/")}
 
     viewer.show(standing, contacts, forces)
     seen = cones()
     viewer.show(standing, contacts, forces, arrows=False)
     assert cones() == seen and len(set(seen.values())) > 1
-    assert not [
-        path for path in viewer.renderer.picture if path.startswith(("measured", "planned"))
-    ]
+    assert not any(path.startswith(("measured", "planned")) for path in viewer.renderer.picture)
 
 
-def test_a_view_chosen_before_the_first_picture_is_kept(go2: Robot, standing: State) -> None:
+def test_a_view_chosen_before_the_first_picture_is_kept(go2, standing):
     def eye(view: Viewer) -> list[float]:
         return list(view.window.scene.commands()["/", "set_camera", ""]["position"])
 
@@ -440,9 +382,7 @@ def test_a_view_chosen_before_the_first_picture_is_kept(go2: Robot, standing: St
     view.close()
 
 
-def test_only_a_call_of_camera_moves_the_camera_again(
-    viewer: Viewer, go2: Robot, standing: State
-) -> None:
+def test_only_a_call_of_camera_moves_the_camera_again(viewer, go2, standing):
     def looked() -> int:
         return viewer.window.scene.since(0)[0]
 
@@ -456,7 +396,7 @@ def test_only_a_call_of_camera_moves_the_camera_again(
     assert looked() == before
 
 
-def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
+def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu():
     robot = load("talos")
     view, contacts = Viewer(robot), Contacts.flat_feet(robot, mu=0.7)
     view.show(robot.standing(), contacts)
@@ -470,17 +410,15 @@ def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu() -> None:
     view.close()
 
 
-def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(
-    viewer: Viewer, go2: Robot
-) -> None:
+def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer, go2):
     state = go2.random_state(1)
     viewer.show(state)
     drawn = matrices(viewer, "/meshcat/com/")
-    np.testing.assert_allclose(drawn["ball"][:3, 3], state.com, atol=1e-6)
-    np.testing.assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
+    assert_allclose(drawn["ball"][:3, 3], state.com, atol=1e-6)
+    assert_allclose(drawn["projection"][:3, 3], [*state.com[:2], 0.0], atol=1e-6)
 
 
-def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> None:
+def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers():
     for robot in map(load, catalogue()):
         viewer = Viewer(robot)
         viewer.show(robot.standing())
@@ -498,16 +436,14 @@ def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers() -> N
         ), robot.name
 
 
-def test_the_name_of_a_robot_is_text_in_the_notebook(go2: Robot) -> None:
+def test_the_name_of_a_robot_is_text_in_the_notebook(go2):
     view = Viewer(dataclasses.replace(go2, name='a "<b>"'))
     assert view.widget().name == 'a "<b>"'
     view.close()
     assert 'title="a &quot;&lt;b&gt;&quot;"' in view._repr_mimebundle_()["text/html"]
 
 
-def test_wrong_input_is_refused_by_name(
-    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_wrong_input_is_refused_by_name(viewer, go2, standing, contacts):
     other, locked = load("solo12").standing(), load("go2", locked=["FL_hip_joint"]).standing()
     for wrong, *named in (
         (lambda: viewer.show(other), "go2", "solo12"),
@@ -518,7 +454,7 @@ def test_wrong_input_is_refused_by_name(
         (lambda: viewer.show(standing, contacts, np.zeros(9)), "forces", 9, 12),
         (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), "planned", np.nan),
         (lambda: viewer.camera("above"), "above", "front"),
-        (lambda: viewer.camera(90.0), 90, "View"),  # type: ignore[arg-type]
+        (lambda: viewer.camera(90.0), 90, "View"),
         (lambda: Viewer("go2"), "robot", "Robot", "go2"),
         (lambda: Viewer(go2, background="pink"), "background", "pink", "white", "light", "dark"),
         (lambda: Viewer(go2, ground=[1, 0, 0]), "ground", 1),

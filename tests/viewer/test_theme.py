@@ -10,13 +10,7 @@ import pytest
 from floatbase import Contacts
 from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
-from floatbase.viewer.scene.colours import (
-    BACKGROUNDS,
-    COM,
-    DARK_SHADES,
-    MEASURED,
-    hex_code,
-)
+from floatbase.viewer.scene.colours import BACKGROUNDS, COM, DARK_SHADES, MEASURED, hex_code
 
 from .looks import picture
 
@@ -39,7 +33,7 @@ def saved(go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> It
 
 
 @pytest.mark.front_end
-def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved: Path) -> None:
+def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved):
     inside = saved.read_text(encoding="utf-8").replace("&", "&amp;").replace('"', "&quot;")
     frame = f'<iframe srcdoc="{inside}" style="width: 100%; height: 560px; border: 0"></iframe>'
     (saved.parent / "outer.html").write_text(

@@ -5,13 +5,12 @@ from __future__ import annotations
 import base64
 import io
 
+import msgpack
 import numpy as np
 import pytest
-import umsgpack
 from PIL import Image
 
-from floatbase.dynamics import Contacts
-from floatbase.robots import Robot, State, load
+from floatbase.robots import State, load
 from floatbase.simulation import Ground
 from floatbase.viewer import Viewer, shapes
 from floatbase.viewer.export.thumbnail import with_thumbnail
@@ -37,8 +36,8 @@ def differing(one: np.ndarray, other: np.ndarray) -> int:
 
 
 def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
-    viewer: Viewer, standing: State, contacts: Contacts, forces: np.ndarray
-) -> None:
+    viewer, standing, contacts, forces
+):
     empty = image(viewer)
     robot = image(viewer.show(standing, com=False))
     assert differing(empty, robot) > 0.05 * robot[..., 0].size
@@ -51,7 +50,7 @@ def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
     assert differing(full[lower_left], image(viewer.show(standing, com=False))[lower_left]) > 500
 
 
-def test_what_is_nearer_hides_what_is_behind_and_translucent_things_do_not(viewer: Viewer) -> None:
+def test_near_objects_hide_far_ones(viewer):
     viewer.show(viewer.robot.standing(), com=False)
     viewer.camera("front")
 
@@ -68,7 +67,7 @@ def test_what_is_nearer_hides_what_is_behind_and_translucent_things_do_not(viewe
 
 
 @pytest.mark.parametrize("name", ["talos", "ur5", "solo8"])
-def test_the_image_of_any_robot_is_small(name: str) -> None:
+def test_the_image_of_any_robot_is_small(name):
     viewer = Viewer(load(name))
     viewer.show(viewer.robot.standing())
     data, _ = viewer._repr_mimebundle_()
@@ -77,23 +76,18 @@ def test_the_image_of_any_robot_is_small(name: str) -> None:
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.4])
-def test_the_image_goes_with_a_robot_that_is_followed(
-    go2: Robot, standing: State, slope: float
-) -> None:
+def test_the_image_goes_with_a_robot_that_is_followed(go2, standing, slope):
     viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
     at_home = image(viewer.show(standing))
     q = standing.q.copy()
-    q[:3] += 2.5 * np.array(
-        [np.cos(slope), 0.0, -np.sin(slope)]
-    )  # a whole jump of the grid, down the slope
+    # a whole jump of the grid, down the slope
+    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])
     away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
     viewer.close()
 
 
-def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(
-    go2: Robot, standing: State
-) -> None:
+def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(go2, standing):
     ground = Ground.stairs(2, 0.1, start=0.25, run=0.5)
     viewer = Viewer(go2, ground=ground, follow=True)
     drawn, start = viewer.painter.drawn_ground, standing.com
@@ -105,9 +99,7 @@ def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(
     viewer.close()
 
 
-def test_another_ground_moves_the_camera_with_the_next_picture_only(
-    go2: Robot, standing: State
-) -> None:
+def test_another_ground_moves_the_camera_with_the_next_picture_only(go2, standing):
     viewer = Viewer(go2, follow=True)
     q = standing.q.copy()
     q[0] += 2.5
@@ -117,11 +109,11 @@ def test_another_ground_moves_the_camera_with_the_next_picture_only(
     assert viewer.window.scene.newest == before
     q[2] += 2.5 * 0.3
     raised = viewer.show(State(go2, q)).window.scene.since(before)[1]
-    assert sum(umsgpack.unpackb(command)["type"] == "set_ground" for command in raised) == 1
+    assert sum(msgpack.unpackb(command)["type"] == "set_ground" for command in raised) == 1
     viewer.close()
 
 
-def test_several_pictures_of_a_panel_are_one_image(viewer: Viewer, standing: State) -> None:
+def test_several_pictures_of_a_panel_are_one_image(viewer, standing):
     viewer.show(standing)
     one, two = viewer.widget(), viewer.widget()
     data, _ = with_thumbnail({}, one, two)
@@ -130,13 +122,9 @@ def test_several_pictures_of_a_panel_are_one_image(viewer: Viewer, standing: Sta
     assert with_thumbnail({"text/plain": "x"}) == ({"text/plain": "x"}, {})
 
 
-def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(
-    viewer: Viewer, standing: State, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(viewer, standing, monkeypatch):
     monkeypatch.setenv("FLOATBASE_VIEWER", "static")
     copy = viewer.show(standing).widget()
     assert "<iframe" in copy.value
-    assert with_thumbnail({"text/plain": "x"}, copy) == (
-        {"text/plain": "x", "text/html": copy.value},
-        {},
-    )
+    expected = ({"text/plain": "x", "text/html": copy.value}, {})
+    assert with_thumbnail({"text/plain": "x"}, copy) == expected

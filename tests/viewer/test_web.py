@@ -9,7 +9,7 @@ from floatbase.viewer.web import pages
 WEB = pages.DIST.parent
 
 
-def test_the_built_pages_are_up_to_date() -> None:
+def test_the_built_pages_are_up_to_date():
     """As build.mjs computes it."""
     digest = hashlib.sha256()
     files = (path for path in (WEB / "src").rglob("*") if path.is_file())

@@ -14,9 +14,9 @@ from threading import Event, Thread
 import numpy as np
 
 from floatbase._validation import Array
-from floatbase.control.limits import hard_maximum
+from floatbase.control.limits import force_rows, hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, residual_of
-from floatbase.control.tick.problem_arrays import dynamics_of, pack_problem
+from floatbase.control.tick.problem_arrays import Indices, dynamics_of, pack_problem
 from floatbase.control.tick.targets import TargetLayout, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
@@ -125,9 +125,13 @@ class CompiledTick:
             if i in time_varying or task_kind(task) is None
         ]
         self.default_inputs = self.user_terms.zero_inputs(self.layout.constant)
-        self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
+        self._q_shape = (robot.nq,)
+        self._v_shape = (nv,)
+        self._n_multipliers = nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
-        self._workspace_sizes, self._tables, self._tick = tick.workspace_sizes, tables, tick.tick
+        self._workspace_sizes = tick.workspace_sizes
+        self._tables = tables
+        self._tick = tick.tick
         self._n_stages = tick.N_STAGES
         self._varies = self.layout.varies or self.user_terms.varies
         self._n_user_rows = -1
@@ -232,6 +236,26 @@ class CompiledTick:
         return assemble_qp(
             eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities
         )
+
+    def pack(self, problem: Problem) -> tuple[Indices, Indices, Array]:
+        """Return a problem with the same tasks as arrays for the tick: sizes, integers, floats."""
+        return pack_problem(problem, self.layout)
+
+    @property
+    def row_owners(self) -> list[tuple[str, str, int]]:
+        """Kind, owner and number of the rows that the tick numbers, also of those without a bound.
+
+        User-defined rows come after them.
+        """
+        contacts, limits = self._problem.contacts, self._problem.limits
+        names, joints = contacts.point_names, self._problem.robot.joint_names
+        of_forces = force_rows(contacts, limits)[1][: len(names) * (limits.facets + 1)]
+        owners = [(label.kind, label.owner, label.number or 0) for label in of_forces]
+        owners += [("largest normal force", name, 0) for name in names]
+        for kind in ("torque limit", "joint limit"):
+            for side in ("upper", "lower"):
+                owners += [(f"{side} {kind}", name, 0) for name in joints]
+        return owners
 
     def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
         """Return the multipliers of all inequalities of the reference QP."""

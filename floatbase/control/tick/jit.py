@@ -33,12 +33,10 @@ _OPTIONS: dict[str, Any] = {
 }
 
 jit: Callable[..., Any] = partial(numba.njit, **_OPTIONS)
-jit_inline: Callable[..., Any] = partial(
-    numba.njit, inline="always", **_OPTIONS
-)  # becomes part of its caller, so it may return arrays
-jit_forceinline: Callable[..., Any] = partial(
-    numba.njit, forceinline=True, **_OPTIONS
-)  # small and called often
+# becomes part of its caller, so it may return arrays
+jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS)
+# small and called often
+jit_forceinline: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTIONS)
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
 jit_enabled = hasattr(jit(lambda: None), "py_func")  # False if NUMBA_DISABLE_JIT is set

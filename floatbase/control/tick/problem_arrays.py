@@ -29,10 +29,16 @@ POINT, FLAT, USER_DEFINED = range(3)
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 QDD, TAU, FORCES = range(len(BLOCKS))
 _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
+# entries of `sizes`: numbers of joints, contacts, points, rows of eq. (5), rows of one cone
+# (its facets and the minimum normal force), built-in tasks, driven joints, entries of λ, targets,
+# numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
+N_JOINTS, N_CONTACTS, N_POINTS, N_MOTION_ROWS, N_CONE_ROWS, N_TASKS, N_DRIVEN = range(7)
+N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 12)
+# then 1 or 0: all contacts are points, `Inequalities.has_optional`, there are joint limits
+POINTS_ONLY, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
 Indices: TypeAlias = npt.NDArray[np.int64]
-PolyhedronOptions: TypeAlias = tuple[
-    int, bool, float
-]  # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
+# facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
+PolyhedronOptions: TypeAlias = tuple[int, bool, float]
 
 
 class Dynamics:
@@ -41,7 +47,9 @@ class Dynamics:
     _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
 
     def __init__(self, robot: Robot):
-        self.robot, self.data, self.lock = robot, robot.model.createData(), Lock()
+        self.robot = robot
+        self.data = robot.model.createData()
+        self.lock = Lock()
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(
@@ -93,33 +101,25 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses = _pack_tasks(problem, layout)
     dynamics, limits = dynamics_of(problem.robot), problem.limits
-    problem_contacts = problem.contacts
-    sizes = (
-        len(dynamics.tree),
-        len(contacts),
-        len(points),
-        contacts[:, 4].sum(),
-        limits.facets + 1,
-        len(tasks),
-        problem.robot.d,
-    )
-    user_contacts = contacts[contacts[:, 1] == USER_DEFINED]
-    points_only = np.all(contacts[:, 1] == POINT)
-    n_user_contact_numbers = sum(
-        m * (problem.robot.nv + 1) + k * problem.robot.nv for m, k in user_contacts[:, 4:]
-    )
-    n_inequalities = len(limits.all_inequalities(problem_contacts))
-    has_optional = n_inequalities > 0 or np.any(hard_maximum(problem_contacts, limits))
-    counts = (
-        problem_contacts.k,
-        layout.size,
-        n_user_contact_numbers,
-        len(problem.tasks) - len(tasks),
-        n_inequalities,
-        points_only,
-        has_optional,
-        limits.joint_limits is not None,
-    )
+    n_inequalities = len(limits.all_inequalities(problem.contacts))
+    nv, user_contacts = problem.robot.nv, contacts[contacts[:, 1] == USER_DEFINED]
+    sizes = {
+        N_JOINTS: len(dynamics.tree),
+        N_CONTACTS: len(contacts),
+        N_POINTS: len(points),
+        N_MOTION_ROWS: contacts[:, 4].sum(),
+        N_CONE_ROWS: limits.facets + 1,
+        N_TASKS: len(tasks),
+        N_DRIVEN: problem.robot.d,
+        N_FORCES: problem.contacts.k,
+        N_TARGETS: layout.size,
+        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:]),
+        N_USER_TASKS: len(problem.tasks) - len(tasks),
+        N_INEQUALITIES: n_inequalities,
+        POINTS_ONLY: np.all(contacts[:, 1] == POINT),
+        HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
+        HAS_JOINT_LIMITS: limits.joint_limits is not None,
+    }
     # the first entry is the counter of a workspace
     float_tables = (
         0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits,
@@ -127,7 +127,7 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     )  # fmt: skip
     int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
     return (
-        np.array((*sizes, *counts), np.int64),
+        np.array([sizes[entry] for entry in range(len(sizes))], np.int64),
         int_tables,
         np.concatenate([np.ravel(table) for table in float_tables]),
     )

@@ -45,7 +45,9 @@ class TargetLayout:
     """Positions of all targets in one array: those of the tasks with a compiled form."""
 
     def __init__(self, problem: Problem):
-        self._problem, self.size, self.tasks = problem, 0, list[TaskTargets]()
+        self._problem = problem
+        self.size = 0
+        self.tasks = list[TaskTargets]()
         robot, k = problem.robot, problem.contacts.k
         for i, task in enumerate(problem.tasks):
             if (kind := task_kind(task)) is not None:

@@ -27,6 +27,23 @@ from floatbase.control.tick.elimination import (
 from floatbase.control.tick.inequalities import Inequalities, affine_value, joint_bounds
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
+from floatbase.control.tick.problem_arrays import (
+    HAS_JOINT_LIMITS,
+    HAS_OPTIONAL,
+    N_CONE_ROWS,
+    N_CONTACT_NUMBERS,
+    N_CONTACTS,
+    N_DRIVEN,
+    N_FORCES,
+    N_INEQUALITIES,
+    N_JOINTS,
+    N_MOTION_ROWS,
+    N_POINTS,
+    N_TARGETS,
+    N_TASKS,
+    N_USER_TASKS,
+    POINTS_ONLY,
+)
 from floatbase.control.tick.workspace import all_finite, take_matrix, take_vector
 from floatbase.robots import UNIT_NORM_TOLERANCE
 
@@ -40,34 +57,35 @@ MAX_ENTRY = 1e8
 def unpack(nv, sizes, int_tables, float_tables, inputs, least, largest, saturated):
     """Return tree, links, contacts, tasks, limits and joint limits from their flat arrays.
 
-    `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: number of
-    joints, contacts, points, motion rows, facets + 1, tasks, driven joints, entries of λ, targets,
-    numbers of user-defined contacts, user-defined tasks, groups of user-defined rows; then 1 or 0:
-    whether all contacts are points, `Inequalities.has_optional` and whether there are joint limits.
-    least, largest, saturated: memory for `Inequalities`. int_tables, float_tables:
-    integers and real numbers of all tables, one table after another, as in a workspace. inputs: as
-    for `tick`.
+    `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: its entries
+    have names in `problem_arrays`. least, largest, saturated: memory for `Inequalities`.
+    int_tables, float_tables: integers and real numbers of all tables, one table after another, as
+    in a workspace. inputs: as for `tick`.
     """
-    n, n_contacts, n_points, n_rows, n_tasks = sizes[0], sizes[1], sizes[2], sizes[4], sizes[5]
-    d, k = sizes[6], sizes[7]
+    n, d, k = sizes[N_JOINTS], sizes[N_DRIVEN], sizes[N_FORCES]
+    n_contacts, n_points, n_rows = sizes[N_CONTACTS], sizes[N_POINTS], sizes[N_CONE_ROWS]
+    n_tasks, n_user_tasks = sizes[N_TASKS], sizes[N_USER_TASKS]
     int_tables[0], float_tables[0] = 1, 1
     tree, links = take_matrix(int_tables, n, 5), take_matrix(float_tables, n, 4)
     contact_table = take_matrix(int_tables, n_contacts, 6)
     frames = take_matrix(float_tables, n_contacts, 16)
     points = take_matrix(float_tables, n_points, 3)
-    bounds, user_start = sizes[8], sizes[8] + 2 * n_points
-    contacts = ContactTable(contact_table, frames, points, inputs, user_start, sizes[12] == 1)
+    bounds = sizes[N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
+    user_start = bounds + 2 * n_points
+    points_only = sizes[POINTS_ONLY] == 1
+    contacts = ContactTable(contact_table, frames, points, inputs, user_start, points_only)
     task_table, gains = take_matrix(int_tables, n_tasks, 3), take_matrix(float_tables, n_tasks, 3)
-    user_tasks = user_start + sizes[9]
-    n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, sizes[10], nv, k, d)
+    user_tasks = user_start + sizes[N_CONTACT_NUMBERS]
+    n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, n_user_tasks, nv, k, d)
     task_frames = take_matrix(float_tables, n_tasks, 12)
-    tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, sizes[10], n_user_rows)
+    tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, n_user_tasks, n_user_rows)
     cones = take_matrix(float_tables, n_points * n_rows, 5)
     torque_limits = take_vector(float_tables, d)
     joint_limits, period_and_weight = take_matrix(float_tables, 6, d), take_vector(float_tables, 2)
     limits = Inequalities(
-        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities, sizes[11],
-        sizes[13] == 1, sizes[14] == 1, least, largest, period_and_weight[1], saturated,
+        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities,
+        sizes[N_INEQUALITIES], sizes[HAS_OPTIONAL] == 1, sizes[HAS_JOINT_LIMITS] == 1, least,
+        largest, period_and_weight[1], saturated,
     )  # fmt: skip
     return tree, links, contacts, tasks, limits, joint_limits, period_and_weight[0]
 
@@ -77,7 +95,9 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
 
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """
-    n_joints, _, _, m, _, n_tasks, d, k = (int(size) for size in sizes[:8])
+    n_joints, n_tasks, m, d, k = (
+        int(sizes[entry]) for entry in (N_JOINTS, N_TASKS, N_MOTION_ROWS, N_DRIVEN, N_FORCES)
+    )
     base = 6
     nv = d + base
     n = nv + k  # and no more β than that
@@ -144,7 +164,7 @@ def make_tick(digest):
         `Inequalities.saturated`. stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
-        nv, m, d, k = v.size, sizes[3], sizes[6], sizes[7]
+        nv, m, d, k = v.size, sizes[N_MOTION_ROWS], sizes[N_DRIVEN], sizes[N_FORCES]
         base, n = nv - d, nv + k
         float_workspace[0], int_workspace[0] = 1, 1
         least, largest = take_vector(float_workspace, d), take_vector(float_workspace, d)

@@ -30,13 +30,10 @@ class TickInputs(NamedTuple):
     packed: Array
     n_user_rows: int = 0  # of all user-defined tasks
     contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each user-defined contact
-    residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType(
-        {}
-    )  # weight and residual of user-defined tasks, by their index in the problem
-    normal_forces: tuple[Array, Array] = (
-        np.zeros(0),
-        np.zeros(0),
-    )  # minimum and maximum of each point, (P,)
+    # weight and residual of user-defined tasks, by their index in the problem
+    residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType({})
+    # minimum and maximum of each point, (P,)
+    normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
     inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of user-defined rows
 
 
@@ -92,9 +89,12 @@ class UserTerms:
         packed: list[npt.ArrayLike] = [targets, *finite]
         if not self.any:
             return TickInputs(np.concatenate(packed), normal_forces=bounds)
-        state = State._unchecked(problem.robot, q, v)  # the compiled tick checks q and v
+        state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
         eom = EquationsOfMotion(state, problem.contacts, t)
-        contacts, residuals, n_user_rows, inequalities = [], {}, 0, []
+        contacts = []
+        residuals = {}
+        n_user_rows = 0
+        inequalities = []
         for contact in self._contacts:
             A, b, J = constraint_and_jacobian(contact, eom.state, t)
             contacts.append((A, b, J))

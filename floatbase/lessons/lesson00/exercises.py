@@ -8,7 +8,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.lessons.exercises import Exercise, OwnNumber
-from floatbase.lessons.judges import NumericJudge
+from floatbase.lessons.judges import Mistake, NumericJudge
 from floatbase.robots import Robot
 
 UP = 2.0  # m/s², the requested acceleration
@@ -28,8 +28,28 @@ def _sum_of_forces(up: float = UP) -> float:
     return float((state.M @ qdd + state.h)[2])
 
 
-def _weight() -> float:
-    return _go2().weight
+def _mistakes(up: float) -> list[Mistake]:
+    mass, weight, g = _go2().mass, _go2().weight, _go2().gravity
+    return [
+        ("weight_alone", weight, "That is the weight alone. With this force the robot stays at "
+         "rest or keeps its velocity."),
+        ("ma_alone", up * mass, "That is m a, the sum of all forces on the robot. Is the "
+         "ground's force the only one?"),
+        ("downwards", weight - up * mass, "With this force the robot would accelerate "
+         "downwards. Draw both forces. Which one is larger?"),
+        ("acceleration", g + up, "That is an acceleration, in m/s². A force needs the "
+         "mass."),
+        ("mass_on_g_alone", weight + up, "The weight is right. Multiply the acceleration by the "
+         "mass before you add it."),
+        ("g_without_mass", up * mass + g, "m a is right, but g without the "
+         "mass is not a force."),
+        ("g_is_10", (10.0 + up) * mass, "That uses g = 10 m/s². The simulation uses 9.81 "
+         "m/s²."),
+        ("one_foot", _sum_of_forces(up) / 4, "That is the mean force at one foot. The question is "
+         "about all feet."),
+        ("reaction", -_sum_of_forces(up), "That is the force of the robot on the ground. The "
+         "answer is the force of the ground on the robot."),
+    ]  # fmt: skip
 
 
 def _judge(up: float) -> NumericJudge:
@@ -38,41 +58,13 @@ def _judge(up: float) -> NumericJudge:
         right=lambda: _sum_of_forces(up),
         tolerance=2e-3,  # g may be 9.8
         praise="The ground carries the weight and accelerates the mass: m (g + a).",
-        mistakes={
-            "weight_alone": _weight,
-            "ma_alone": lambda: up * _go2().mass,
-            "downwards": lambda: _weight() - up * _go2().mass,
-            "acceleration": lambda: _go2().gravity + up,
-            "mass_on_g_alone": lambda: _weight() + up,
-            "g_without_mass": lambda: up * _go2().mass + _go2().gravity,
-            "g_is_10": lambda: (10.0 + up) * _go2().mass,
-            "one_foot": lambda: _sum_of_forces(up) / 4,
-            "reaction": lambda: -_sum_of_forces(up),
-        },
-        hints={
-            "weight_alone": "That is the weight alone. With this force the robot stays at "
-            "rest or keeps its velocity.",
-            "ma_alone": "That is m a, the sum of all forces on the robot. Is the ground's "
-            "force the only one?",
-            "downwards": "With this force the robot would accelerate downwards. Draw both "
-            "forces. Which one is larger?",
-            "acceleration": "That is an acceleration, in m/s². A force needs the mass.",
-            "mass_on_g_alone": "The weight is right. Multiply the acceleration by the mass before "
-            "you add it.",
-            "g_without_mass": "m a is right, but g without the mass is not a force.",
-            "g_is_10": "That uses g = 10 m/s². The simulation uses 9.81 m/s².",
-            "one_foot": "That is the mean force at one foot. The question is about all feet.",
-            "reaction": "That is the force of the robot on the ground. The answer is the "
-            "force of the ground on the robot.",
-        },
+        mistakes=lambda: _mistakes(up),
     )
 
 
 EXERCISES = (
     Exercise(
         name="00.1",
-        statement="The centre of mass of go2 accelerates upwards at 2 m/s². What is the sum of "
-        "the vertical forces that the ground exerts on its feet, in N?",
         stub="total = 100.0  # N: replace this number by an expression",
         solution="total = robot.mass * (robot.gravity + 2.0)",
         judge=_judge(UP),

@@ -1,6 +1,5 @@
 """Lesson 01, "What is a floating base?"."""
 
-from floatbase.lessons.lesson01.exercises import EXERCISES
 from floatbase.lessons.lesson01.helpers import (
     LIFT_URDF,
     base_rotation,
@@ -18,20 +17,3 @@ from floatbase.lessons.lesson01.pictures import (
     stance_panel,
     thruster_panel,
 )
-
-__all__ = [
-    "EXERCISES",
-    "LIFT_URDF",
-    "PRESSING_POSTURE",
-    "base_rotation",
-    "com_panel",
-    "joint_circle",
-    "joint_turn",
-    "play_floating",
-    "play_pressing",
-    "pressing_panel",
-    "show_arm",
-    "stance_panel",
-    "thruster_panel",
-    "weightless_simulation",
-]  # fmt: skip

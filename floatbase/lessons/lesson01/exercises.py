@@ -11,10 +11,12 @@ from floatbase._validation import Array
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
+    Mistake,
     NumericJudge,
     ShapeJudge,
     Verdict,
     array_judge,
+    first_fault,
     format_vector,
 )
 from floatbase.lessons.lesson01.pictures import PRESSING_POSTURE
@@ -44,18 +46,11 @@ def _on_the_plate() -> fb.State:
 
 
 def _by_levers(
-    press: float = 120.0,
-    *,
-    weight: float | None = None,
-    below: float = 0.0,
-    ahead: float | None = None,
+    press: float = 120.0, weight: float = 0.0, below: float = 0.0, ahead: float | None = None
 ) -> float:
     """Return the width at which push and weight have equal moments about the rear edge [m]."""
     state = _on_the_plate()
-    height, weight = (
-        state.point("tool0")[2] - below,
-        state.robot.weight if weight is None else weight,
-    )
+    height, weight = state.point("tool0")[2] - below, weight or state.robot.weight
     return float(2 * (press * height / weight - (state.com[0] if ahead is None else ahead)))
 
 
@@ -72,40 +67,21 @@ def _judge_thrust(f: Array) -> Verdict:
     state = fb.load("go2").standing()
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     # by the momentum that follows from (4), not by sums of forces and moments
-    rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + [
-        0.0,
-        0.0,
-        state.robot.weight,
-        0.0,
-        0.0,
-        0.0,
-    ]
-    if abs(rate[2] + 200.0) < 0.2:
-        return Verdict(
-            False,
-            "The magnitude is right, but the sign is wrong: these thrusters push the robot down.",
-            "sign",
-        )
-    if abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2:
-        return Verdict(
-            False,
-            f"The forces add up to {format_vector(rate[:3])} N, but they should add up to "
-            f"(0, 0, 200) N.",
-            "force",
-        )
-    if abs(rate[3:]).max() > 0.02:
-        where = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
-        return Verdict(
-            False,
-            f"The force is right, but there is a moment of ({where}) N·m about the centre of mass, "
-            f"which turns the robot as a whole.",
-            "moment",
-        )
-    return Verdict(
+    without_gravity = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
+    rate = centroidal_momentum_rate(state, eom.acceleration(np.zeros(12), f)) + without_gravity
+    moment = ", ".join(f"{x + 0.0:.1f}" for x in np.round(rate[3:], 1))
+    return first_fault([
+        ("sign", abs(rate[2] + 200.0) < 0.2, "The magnitude is right, but the sign is wrong: these "
+         "thrusters push the robot down."),
+        ("force", abs(rate[:3] - [0.0, 0.0, 200.0]).max() > 0.2, "The forces add up to "
+         f"{format_vector(rate[:3])} N, but they should add up to (0, 0, 200) N."),
+        ("moment", abs(rate[3:]).max() > 0.02, f"The force is right, but there is a moment of "
+         f"({moment}) N·m about the centre of mass, which turns the robot as a whole."),
+    ]) or Verdict(
         True,
         "Straight up without turning. There are six conditions for twelve numbers, so there are "
         "many other answers.",
-    )
+    )  # fmt: skip
 
 
 def _thrusts() -> list[Example]:
@@ -118,11 +94,55 @@ def _thrusts() -> list[Example]:
     return [*right, (-f, "sign"), (2 * f, "force"), (f[:, [2, 1, 0]], "force"), (f[::-1], "moment")]
 
 
+def _actuation_mistakes() -> list[Mistake]:
+    S, without_belt = _actuation_of_solo8(), _actuation_of_solo8(belt=0.0)
+    every_leg = S + sum(_actuation_of_solo8(torque=knee) - without_belt for knee in (3, 5, 7))
+    return [
+        ("no_belt", without_belt, "This is S with a motor in every joint. Which "
+         "other row does the motor with the belt act on?"),
+        ("belt_reversed", _actuation_of_solo8(torque=0), "Here the hip motor acts on the knee as "
+         "well. Columns belong to motors, and rows to joints."),
+        ("belt_sign", _actuation_of_solo8(belt=-1.0), "The sign of the belt is wrong. The motor "
+         "turns in the same direction when the hip moves and when the knee moves."),
+        ("every_leg", every_leg, "Every leg has a belt here. Only the front left leg has one."),
+        ("moved_to_hip", S - np.outer(np.eye(14)[7], np.eye(8)[1]),
+         "The belt still drives the knee. Its motor acts on the hip and on the knee."),
+        ("base_last", np.roll(S, -6, axis=0), "The base comes first in q, as "
+         "in (2). Here its rows come last."),
+        ("zeros", np.zeros((14, 8)), "All entries are zero, so no motor drives anything. Where "
+         "does each torque act?"),
+        ("sign", -S, "The sign is wrong. Should a positive torque push its "
+         "joint backwards?"),
+    ]  # fmt: skip
+
+
+def _width_mistakes() -> list[Mistake]:
+    return [
+        ("half", _held_width() / 2, "That is the distance from the middle to the rear edge. The "
+         "plate extends as far to the front."),
+        ("height_from_base", _by_levers(below=PLATE_SIZE[1]), "The plate tips about an edge on the "
+         "floor. Measure the height of the tool from the floor, not from the base."),
+        ("com_in_middle", _by_levers(ahead=0.0), "Where does the weight act? The centre of mass is "
+         "not above the middle of the plate."),
+        ("com_sign", _by_levers(ahead=-_on_the_plate().com[0]), "The centre of mass is ahead of "
+         "the middle, and the plate tips about its rear edge. Does that help or not?"),
+        ("plate_as_is", PLATE_SIZE[0], "That is the present width, and with 120 N this plate tips "
+         "over."),
+        ("in_proportion", _in_proportion(), "The largest push is not proportional to the width of "
+         "the plate: part of the lever arm exists without a plate."),
+        ("half_press", _by_levers(60.0), "That is enough for 60 N. The arm is to press with 120 "
+         "N."),
+        ("mass", _by_levers(weight=_on_the_plate().robot.mass), "That uses the mass instead of the "
+         "weight. A force needs one more factor."),
+        ("exchanged", _by_levers(_on_the_plate().robot.weight, weight=120.0),
+         "Height and distance from the edge are interchanged. Which lever arm belongs to the push, "
+         "and which to the weight?"),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="01.1",
-        statement="solo8 has a hip and a knee joint in each of its four legs. The knee motor of "
-        "the front left leg sits in the trunk, with a belt past the hip joint. Write S.",
         stub="S_solo8 = np.eye(8)  # replace this: stack what is missing, and add the belt",
         solution="S_solo8 = np.vstack([np.zeros((6, 8)), np.eye(8)])\n"
         "S_solo8[6, 1] = 1.0  # the knee motor also acts on the hip",
@@ -134,10 +154,7 @@ EXERCISES = (
                 ): "S maps 8 torques to all rows of the equations of motion. How many rows does "
                 "a base add, and where?",
                 (8, 14): "This is the transpose of the answer. S maps 8 torques to 14 rows.",
-                (
-                    9,
-                    8,
-                ): "A base adds more than one row: three for its position and three for its "
+                (9, 8): "A base adds more than one row: three for its position and three for its "
                 "orientation.",
                 (18, 12): "That is the S of go2, which has three joints in each leg. solo8 has "
                 "two.",
@@ -151,36 +168,7 @@ EXERCISES = (
                 right=_actuation_of_solo8,
                 praise="Six rows without a motor, then one row for each joint. The belt adds one "
                 "entry.",
-                mistakes={
-                    "no_belt": lambda: _actuation_of_solo8(belt=0.0),
-                    "belt_reversed": lambda: _actuation_of_solo8(torque=0),
-                    "belt_sign": lambda: _actuation_of_solo8(belt=-1.0),
-                    "every_leg": lambda: sum(
-                        (_actuation_of_solo8(torque=knee) for knee in (3, 5, 7)),
-                        _actuation_of_solo8() - 3 * _actuation_of_solo8(belt=0.0),
-                    ),
-                    "moved_to_hip": lambda: (
-                        _actuation_of_solo8() - np.outer(np.eye(14)[7], np.eye(8)[1])
-                    ),
-                    "base_last": lambda: np.roll(_actuation_of_solo8(), -6, axis=0),
-                    "zeros": lambda: np.zeros((14, 8)),
-                    "sign": lambda: -_actuation_of_solo8(),
-                },
-                hints={
-                    "no_belt": "This is S with a motor in every joint. Which other row does the "
-                    "motor with the belt act on?",
-                    "belt_reversed": "Here the hip motor acts on the knee as well. Columns belong "
-                    "to motors, and rows to joints.",
-                    "belt_sign": "The sign of the belt is wrong. The motor turns in the same "
-                    "direction when the hip moves and when the knee moves.",
-                    "every_leg": "Every leg has a belt here. Only the front left leg has one.",
-                    "moved_to_hip": "The belt still drives the knee. Its motor acts on the hip "
-                    "and on the knee.",
-                    "base_last": "The base comes first in q, as in (2). Here its rows come last.",
-                    "zeros": "All entries are zero, so no motor drives anything. Where does "
-                    "each torque act?",
-                    "sign": "The sign is wrong. Should a positive torque push its joint backwards?",
-                },
+                mistakes=_actuation_mistakes,
             ),
         ),
         explanation="(2) puts the six numbers of the base before the joints, so (3) puts six "
@@ -189,11 +177,6 @@ EXERCISES = (
     ),
     Exercise(
         name="01.2",
-        statement="A design: go2 floats in its standing posture with a thruster at every foot. "
-        "Choose the forces, shape (4, 3), N, world, in the order of `contacts.names`. The motors "
-        "hold the joints. Together the forces "
-        " must push straight up with 200 N, without any moment. Row i of `levers` is x_i - "
-        "x_c.",
         stub="thrust = np.tile([0.0, 0.0, 50.0], (4, 1))  # N: four equal thrusts are a first "
         "guess",
         solution="moments = [np.cross(np.eye(3), -lever).T for lever in levers]\n"
@@ -213,9 +196,6 @@ EXERCISES = (
     ),
     Exercise(
         name="01.3",
-        statement="The arm on its plate is to press with 120 N. How wide, in m, must the square "
-        'plate be, at least? `at_rest` has .com and .point("tool0"), and `standing.weight` is '
-        "the weight. The plate has no weight. Everything else stays the same.",
         stub="width = 0.4  # m: replace this number by an expression",
         solution='lever = at_rest.point("tool0")[2]\nwidth = 2 * (120 * lever / standing.weight - '
         "at_rest.com[0])",
@@ -223,34 +203,7 @@ EXERCISES = (
             right=_held_width,
             praise="A harder push needs a wider plate. A walking robot cannot widen its plate; "
             "it puts a foot in the right place in time.",
-            mistakes={
-                "half": lambda: _held_width() / 2,
-                "height_from_base": lambda: _by_levers(below=PLATE_SIZE[1]),
-                "com_in_middle": lambda: _by_levers(ahead=0.0),
-                "com_sign": lambda: _by_levers(ahead=-_on_the_plate().com[0]),
-                "plate_as_is": lambda: PLATE_SIZE[0],
-                "in_proportion": (_in_proportion),
-                "half_press": lambda: _by_levers(60.0),
-                "mass": lambda: _by_levers(weight=_on_the_plate().robot.mass),
-                "exchanged": lambda: _by_levers(_on_the_plate().robot.weight, weight=120.0),
-            },
-            hints={
-                "half": "That is the distance from the middle to the rear edge. The plate "
-                "extends as far to the front.",
-                "height_from_base": "The plate tips about an edge on the floor. Measure the "
-                "height of the tool from the floor, not from the base.",
-                "com_in_middle": "Where does the weight act? The centre of mass is not above "
-                "the middle of the plate.",
-                "com_sign": "The centre of mass is ahead of the middle, and the plate tips "
-                "about its rear edge. Does that help or not?",
-                "plate_as_is": "That is the present width, and with 120 N this plate tips over.",
-                "in_proportion": "The largest push is not proportional to the width of the "
-                "plate: part of the lever arm exists without a plate.",
-                "half_press": "That is enough for 60 N. The arm is to press with 120 N.",
-                "mass": "That uses the mass instead of the weight. A force needs one more factor.",
-                "exchanged": "Height and distance from the edge are interchanged. Which lever "
-                "arm belongs to the push, and which to the weight?",
-            },
+            mistakes=_width_mistakes,
         ),
         explanation="Moments about the rear edge: 120 N × height = weight × (half the width + "
         "distance of the centre of mass ahead of the middle).",

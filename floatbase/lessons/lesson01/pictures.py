@@ -65,10 +65,8 @@ def pressing_panel(view: Viewer, state: fb.State) -> SliderPanel:
             extra["label/bolts"] = shapes.label(start + [-0.02, 0.0, 0.06], "f{bolts}", 0.06)
             extra["label/moment"] = shapes.label([0.26, 0.16, 0.14], "τ{b}", 0.06)
         view.show(state, com=False, extra=extra)
-        tau, limits = (
-            abs(state.h - state.frame_jacobian("tool0")[:3].T @ force),
-            state.robot.torque_limits,
-        )
+        tau = abs(state.h - state.frame_jacobian("tool0")[:3].T @ force)
+        limits = state.robot.torque_limits
         busiest = int(np.argmax(tau / limits))
         return (
             f"wall on tool <b>{rounded(-press, 'N', 3)}</b>, bolts on base "
@@ -177,9 +175,8 @@ def thruster_panel(view: Viewer, state: fb.State, contacts: fb.Contacts) -> Slid
         for name, foot, force in zip(contacts.names, feet, f, strict=True):
             if force.any():
                 vector = view.scale * force
-                start = (
-                    foot - vector if force[2] > 0 else foot
-                )  # below the foot either way, where no leg hides it
+                # below the foot either way, where no leg hides it
+                start = foot - vector if force[2] > 0 else foot
                 drawn[f"thrust/{name}"] = shapes.arrow(
                     start, vector, MEASURED, 2 * view.painter.size
                 )

@@ -9,16 +9,18 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     NO_ANSWER,
     Example,
+    Mistake,
     NumericJudge,
     ShapeJudge,
     Verdict,
+    first_fault,
     format_vector,
 )
+from floatbase.lessons.lesson03 import standing_go2_eom
 
 
 @cache
@@ -38,27 +40,6 @@ def _generalised() -> Array:
     return np.array([force @ (a - b) / (2 * h) for a, b in zip(ahead, back, strict=True)])
 
 
-def _generalised_in_world_axes() -> Array:
-    """Return Jᵀ λ with the base rows in world axes: the usual confusion."""
-    state, _ = _moving_go2()
-    R = state.frame_pose("base").rotation
-    wrong = _generalised()
-    wrong[:3], wrong[3:6] = R @ wrong[:3], R @ wrong[3:6]
-    return wrong
-
-
-def _generalised_joints_only() -> Array:
-    wrong = _generalised()
-    wrong[:6] = 0.0
-    return wrong
-
-
-def _standing_go2() -> EquationsOfMotion:
-    """Return the equations of motion of go2 standing on four feet."""
-    robot = fb.load("go2")
-    return fb.equations_of_motion(robot.standing(), fb.Contacts.points(robot))
-
-
 def _judge_holding(answer: Any) -> Verdict:
     """Judge torques and forces that keep a standing go2 still, by (4) row by row."""
     if (
@@ -72,16 +53,11 @@ def _judge_holding(answer: Any) -> Verdict:
     try:
         tau, forces = (np.asarray(part, dtype=np.float64) for part in answer)
     except (TypeError, ValueError):
-        return Verdict(
-            False, "The answer must be two arrays of numbers, (torques, forces).", "not_numbers"
-        )
+        text = "The answer must be two arrays of numbers, (torques, forces)."
+        return Verdict(False, text, "not_numbers")
     if tau.shape != (12,) or forces.shape not in ((12,), (4, 3)):
-        return Verdict(
-            False,
-            f"The shapes are {tau.shape} and {forces.shape}, but they must be (12,) and (12,).",
-            "shapes",
-        )
-    forces = forces.ravel()
+        text = f"The shapes are {tau.shape} and {forces.shape}, but they must be (12,) and (12,)."
+        return Verdict(False, text, "shapes")
     if not (np.all(np.isfinite(tau)) and np.all(np.isfinite(forces))):
         return Verdict(False, "The answer contains numbers that are infinite or NaN.", "not_finite")
     state = fb.load("go2").standing()
@@ -90,63 +66,36 @@ def _judge_holding(answer: Any) -> Verdict:
     f = forces.reshape(4, 3)
     up = f.sum(axis=0) - [0.0, 0.0, state.robot.weight]
     moment = np.cross(contacts.positions(state) - state.com, f).sum(axis=0)
-    if abs(up[2] + 2 * state.robot.weight) < 0.1:
-        return Verdict(
-            False,
-            "These forces push the robot down. λ is the force of the ground on the robot.",
-            "sign",
-        )
-    if np.abs(up).max() > 0.1:
-        return Verdict(
-            False,
-            f"The force rows of the base are not balanced: {format_vector(up, 1)} N remains.",
-            "force_rows",
-        )
-    if np.abs(moment).max() > 0.02:
-        return Verdict(
-            False,
-            f"The moment rows of the base are not balanced: {format_vector(moment, 1)} N·m "
-            f"remains.",
-            "moment_rows",
-        )
-    if f[:, 2].min() < 0.0:
-        return Verdict(
-            False,
-            "The forces are balanced, but one foot pulls on the ground, which is impossible.",
-            "pulls",
-        )
-    pull = np.zeros(18)
+    gravity, pull = state.h[6:], np.zeros(18)
     for contact, force in zip(contacts, f, strict=True):
         pull += contact.jacobian(state).T @ force
-    gravity = state.h[6:]
-    if np.abs(tau - (gravity - pull[6:])).max() < 0.02:
-        return Verdict(
-            True,
-            "Nothing moves. The base rows determined the forces, and then the joint rows "
-            "determined the torques.",
-        )
-    if np.abs(tau - gravity).max() < 0.02:
-        return Verdict(
-            False,
-            "These torques carry only the legs: the term Jᵀ λ is missing from the joint rows.",
-            "gravity_alone",
-        )
-    if np.abs(tau - (gravity + pull[6:])).max() < 0.02:
-        return Verdict(
-            False,
-            "In the joint rows the sign of Jᵀ λ is wrong: S τ and Jᵀ λ are on the same side.",
-            "sign_of_forces",
-        )
-    if np.abs(tau + (gravity - pull[6:])).max() < 0.02:
-        return Verdict(
-            False, "The magnitude of the torques is right, but the sign is wrong.", "torque_sign"
-        )
-    worst = float(np.abs(tau - (gravity - pull[6:])).max())
-    return Verdict(
-        False,
-        f"The base is balanced, but the joint rows are not: up to {worst:.1f} N·m remains.",
-        "joint_rows",
-    )
+    right = gravity - pull[6:]
+
+    def is_near(torques: Array) -> bool:
+        return bool(np.abs(tau - torques).max() < 0.02)
+
+    return first_fault([
+        ("sign", abs(up[2] + 2 * state.robot.weight) < 0.1, "These forces push the robot down. λ "
+         "is the force of the ground on the robot."),
+        ("force_rows", np.abs(up).max() > 0.1, "The force rows of the base are not balanced: "
+         f"{format_vector(up, 1)} N remains."),
+        ("moment_rows", np.abs(moment).max() > 0.02, "The moment rows of the base are not "
+         f"balanced: {format_vector(moment, 1)} N·m remains."),
+        ("pulls", f[:, 2].min() < 0.0, "The forces are balanced, but one foot pulls on the ground, "
+         "which is impossible."),
+        ("gravity_alone", is_near(gravity), "These torques carry only the legs: the term Jᵀ λ is "
+         "missing from the joint rows."),
+        ("sign_of_forces", is_near(gravity + pull[6:]), "In the joint rows the sign of Jᵀ λ is "
+         "wrong: S τ and Jᵀ λ are on the same side."),
+        ("torque_sign", is_near(-right), "The magnitude of the torques is right, but the sign is "
+         "wrong."),
+        ("joint_rows", not is_near(right), "The base is balanced, but the joint rows are not: up "
+         f"to {np.abs(tau - right).max():.1f} N·m remains."),
+    ]) or Verdict(
+        True,
+        "Nothing moves. The base rows determined the forces, and then the joint rows determined "
+        "the torques.",
+    )  # fmt: skip
 
 
 def _holdings() -> list[Example]:
@@ -172,11 +121,55 @@ def _holdings() -> list[Example]:
     ]  # fmt: skip
 
 
+def _shape_mistakes() -> list[Mistake]:
+    return [
+        ("joints_alone", (9, 8), "These are only the columns of the joints. The base also moves a "
+         "foot, so it has columns, too."),
+        ("base_is_one", (9, 9), "A base has six directions, not one: φ maps from R^(d+6)."),
+        ("quaternion", (9, 15), "q has 15 numbers, four of them for the quaternion. J has a column "
+         "for each component of the velocity."),
+        ("transpose", (14, 9), "This is the shape of the transpose."),
+        ("joints_of_one_foot", (3, 8), "Three rows are for one foot. The base has columns, too."),
+        ("one_foot", (3, 14), "Three rows are for one foot. Three feet touch the ground."),
+        ("four_feet", (12, 14), "Three feet touch the ground, not four."),
+        ("lifted_leg", (9, 12), "The joints of the lifted leg count, too. Their columns are zero."),
+        ("joints_for_components", (6, 14), "The velocity of a foot has three components, whatever "
+         "the number of joints in its leg."),
+        ("go2", (9, 18), "18 columns are for go2, which has three joints in each leg. solo8 has "
+         "two."),
+    ]  # fmt: skip
+
+
+def _force_mistakes() -> list[Mistake]:
+    force, state = np.array([10.0, -5.0, 40.0]), _moving_go2()[0]
+    right, R, J = _generalised(), state.frame_pose("base").rotation, state.frame_jacobian("FL_foot")
+    in_world = np.concatenate([R @ right[:3], R @ right[3:6], right[6:]])
+    joints_only = np.concatenate([np.zeros(6), right[6:]])
+    return [
+        ("sign", -right, "The sign is wrong. λ is the force of the ground on the robot, "
+         "and it is on the same side as S τ."),
+        ("world_axes", in_world, "The base rows are in world axes. v, and so "
+         "the base rows, are in the axes of the base."),
+        ("base_zero", joints_only, "The base rows are zero. Motors do not act on "
+         "the base, but a contact force does."),
+        ("standing", fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ force,
+         "This is the Jacobian of the standing robot. `moving` has another posture, so J differs."),
+        ("eom_standing", standing_go2_eom().J[:3].T @ force, "This is the J of `eom`, "
+         "which is for the standing robot and for the points that touch the ground."),
+        ("contact_point", fb.equations_of_motion(*_moving_go2()).J[:3].T @ force,
+         "This force acts at the point that touches the ground. `ground_force` acts at the origin "
+         "of the frame, 2 cm away."),
+        ("turned", J[:3].T @ R.T @ force, "`ground_force` is in world axes, and so are the rows of "
+         "frame_jacobian. No rotation is needed."),
+        ("angular_rows", J[3:].T @ force, "These are the angular rows of the Jacobian. For a force "
+         "at a point, use the linear rows, which come first."),
+        ("zero", np.zeros(18), "Zero would mean that the force has no effect."),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="02.1",
-        statement="solo8 has four legs with two joints each. It lifts one leg and stands on "
-        "three point feet. What is the shape of J, as (rows, columns)?",
         stub="shape_of_J = (3, 8)  # replace this",
         solution="shape_of_J = (9, 14)",
         judge=NumericJudge(
@@ -189,44 +182,12 @@ EXERCISES = (
             ),
             praise="Three rows for each point, and one column for each direction in which the "
             "robot can move: d + 6.",
-            mistakes={
-                "joints_alone": lambda: (9, 8),
-                "base_is_one": lambda: (9, 9),
-                "quaternion": lambda: (
-                    9,
-                    15,
-                ),
-                "transpose": lambda: (14, 9),
-                "joints_of_one_foot": lambda: (3, 8),
-                "one_foot": lambda: (3, 14),
-                "four_feet": lambda: (12, 14),
-                "lifted_leg": lambda: (9, 12),
-                "joints_for_components": lambda: (6, 14),
-                "go2": lambda: (9, 18),
-            },
-            hints={
-                "joints_alone": "These are only the columns of the joints. The base also moves "
-                "a foot, so it has columns, too.",
-                "base_is_one": "A base has six directions, not one: φ maps from R^(d+6).",
-                "quaternion": "q has 15 numbers, four of them for the quaternion. J has a "
-                "column for each component of the velocity.",
-                "transpose": "This is the shape of the transpose.",
-                "joints_of_one_foot": "Three rows are for one foot. The base has columns, too.",
-                "one_foot": "Three rows are for one foot. Three feet touch the ground.",
-                "four_feet": "Three feet touch the ground, not four.",
-                "lifted_leg": "The joints of the lifted leg count, too. Their columns are zero.",
-                "joints_for_components": "The velocity of a foot has three components, whatever "
-                "the number of joints in its leg.",
-                "go2": "18 columns are for go2, which has three joints in each leg. solo8 has two.",
-            },
+            mistakes=_shape_mistakes,
         ),
         explanation="k = 3 · 3 for three feet, and there are d + 6 = 8 + 6 columns.",
     ),
     Exercise(
         name="02.2",
-        statement="`moving` is go2 in a tilted, moving state. The ground pushes on its FL_foot, "
-        "at the origin of the frame, with `ground_force`. Which generalized force, shape (18,), "
-        "appears in (4)?",
         stub="generalised = np.zeros(18)  # replace this: moving.frame_jacobian, ground_force",
         solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ ground_force',
         judge=ShapeJudge(
@@ -242,64 +203,19 @@ EXERCISES = (
                 right=_generalised,
                 praise="The same matrix maps the velocities to the foot's velocity, and its "
                 "transpose maps the foot's force to all rows.",
-                mistakes={
-                    "sign": lambda: -_generalised(),
-                    "world_axes": (_generalised_in_world_axes),
-                    "base_zero": (_generalised_joints_only),
-                    "standing": lambda: (
-                        fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T
-                        @ [10.0, -5.0, 40.0]
-                    ),
-                    "eom_standing": lambda: _standing_go2().J[:3].T @ [10.0, -5.0, 40.0],
-                    "contact_point": lambda: (
-                        fb.equations_of_motion(*_moving_go2()).J[:3].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "turned": (
-                        lambda: (
-                            _moving_go2()[0].frame_jacobian("FL_foot")[:3].T
-                            @ _moving_go2()[0].frame_pose("base").rotation.T
-                            @ [10.0, -5.0, 40.0]
-                        )
-                    ),
-                    "angular_rows": lambda: (
-                        _moving_go2()[0].frame_jacobian("FL_foot")[3:].T @ [10.0, -5.0, 40.0]
-                    ),
-                    "zero": lambda: np.zeros(18),
-                },
-                hints={
-                    "sign": "The sign is wrong. λ is the force of the ground on the robot, and "
-                    "it is on the same side as S τ.",
-                    "world_axes": "The base rows are in world axes. v, and so the base rows, "
-                    "are in the axes of the base.",
-                    "base_zero": "The base rows are zero. Motors do not act on the base, but a "
-                    "contact force does.",
-                    "standing": "This is the Jacobian of the standing robot. `moving` has "
-                    "another posture, so J differs.",
-                    "eom_standing": "This is the J of `eom`, which is for the standing robot "
-                    "and for the points that touch the ground.",
-                    "contact_point": "This force acts at the point that touches the ground. "
-                    "`ground_force` acts at the origin of the frame, 2 cm away.",
-                    "turned": "`ground_force` is in world axes, and so are the rows of "
-                    "frame_jacobian. No rotation is needed.",
-                    "angular_rows": "These are the angular rows of the Jacobian. For a force at "
-                    "a point, use the linear rows, which come first.",
-                    "zero": "Zero would mean that the force has no effect.",
-                },
+                mistakes=_force_mistakes,
             ),
         ),
         explanation="Power is the same in both descriptions: λ · (J v) = (Jᵀ λ) · v for every v.",
     ),
     Exercise(
         name="02.3",
-        statement="A design without a controller: find torques and contact forces that keep the "
-        "standing go2 still, from (4) with q̈ = 0, which is S τ + Jᵀ λ = h. There are 24 "
-        "unknowns and 18 equations.",
         stub="hold_tau = eom.h[6:]\nhold_forces = np.tile([0.0, 0.0, go2.weight / 4], 4)  # a "
         "first guess",
         solution="both = np.linalg.lstsq(np.hstack([eom.S, eom.J.T]), eom.h, rcond=None)[0]\n"
         "hold_tau, hold_forces = both[:12], both[12:]",
         judge=_judge_holding,
-        namespace=lambda: {"go2": fb.load("go2"), "eom": _standing_go2()},
+        namespace=lambda: {"go2": fb.load("go2"), "eom": standing_go2_eom()},
         examples=_holdings,
         explanation="There are six more unknowns than equations. lstsq returns the solution "
         "with the smallest sum of squares. That sum adds N² and (N·m)², so other units would "

@@ -17,8 +17,7 @@ from floatbase.lessons.lesson02.helpers import DISC_RADIUS, parking_states, roll
 from floatbase.lessons.panels import SliderPanel, slider_panel
 from floatbase.robots import Robot
 from floatbase.simulation import Rollout
-from floatbase.viewer import Picture, View, Viewer, markers, shapes
-from floatbase.viewer.scene import geometry
+from floatbase.viewer import Picture, View, Viewer, markers, prefixed, shapes
 from floatbase.viewer.scene.colours import COM, GREYS, PLANNED, hex_code
 
 MOMENT_SCALE = 0.01  # m drawn for a newton metre
@@ -65,12 +64,9 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
         forces[where] = force
         size, scale = view.painter.size, view.scale
         drawn = markers.wrench(base.translation, scale * f, MOMENT_SCALE * moment, size)
-        extra = (
-            {f"base{path}": item for path, item in drawn.items()}
-            if np.linalg.norm(force) > 1e-6
-            else {}
-        )
-        if extra:
+        extra: Picture = {}
+        if np.linalg.norm(force) > 1e-6:
+            extra = prefixed("base", drawn)
             # above the arrow and above the trunk
             lift = np.maximum(scale * f, [-np.inf, -np.inf, 0.1])
             above = base.translation + lift + [0.0, 0.0, 0.04]
@@ -106,12 +102,9 @@ def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> V
     pictures = []
     for i in rows:
         drawn = view.painter.picture(without_b.state(i), com=False, ghost=with_b.state(i)) | pin
-        offset = without_b.state(i).point("tool0") - home
-        length = float(np.linalg.norm(offset))
-        if length > 2e-3:
-            drawn["way"] = shapes.rod(
-                home, geometry.rotation_with_z_axis(offset / length), length, 0.012, GREYS[2]
-            )  # the arm is dark
+        tool = without_b.state(i).point("tool0")
+        if np.linalg.norm(tool - home) > 2e-3:
+            drawn["way"] = props.rod_between(home, tool, 0.012, GREYS[2])  # the arm is dark
         pictures.append(drawn)
     view.play_pictures(without_b.time[rows], pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
@@ -125,7 +118,7 @@ def play_collapse_comparison(
     duration: float,
 ) -> Viewer:
     """Play the robot without b, and the robot with b as a ghost."""
-    places = contacts.positions(without_b[0])
+    places, colour = contacts.positions(without_b[0]), view.painter.text_colour
     home = {
         f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03)
         for i, p in enumerate(places)
@@ -134,23 +127,13 @@ def play_collapse_comparison(
     def picture(ours: fb.State, theirs: fb.State) -> Picture:
         drawn = view.painter.picture(ours, com=False, ghost=theirs) | home
         for i, (a, b) in enumerate(zip(places, contacts.positions(ours), strict=True)):
-            offset = b - a
-            length = float(np.linalg.norm(offset))
-            if length > 2e-3:  # beside the foot, where it is seen
-                start = a + [0.0, 0.06 * np.sign(a[1]), 0.0]
-                drawn[f"way/{i}"] = shapes.rod(
-                    start,
-                    geometry.rotation_with_z_axis(offset / length),
-                    length,
-                    0.006,
-                    view.painter.text_colour,
-                )
+            if np.linalg.norm(b - a) > 2e-3:
+                aside = np.array([0.0, 0.06 * np.sign(a[1]), 0.0])  # where it is seen
+                drawn[f"way/{i}"] = props.rod_between(a + aside, b + aside, 0.006, colour)
         return drawn
 
     rows = np.linspace(0, len(with_b) - 1, 30).astype(int)
-    view.add_legend_entry(
-        "way", view.painter.text_colour, "from where a foot belongs to where it is"
-    )
+    view.add_legend_entry("way", colour, "from where a foot belongs to where it is")
     pictures = [picture(without_b[i], with_b[i]) for i in rows]
     view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
     return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
@@ -164,26 +147,16 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
         picture = view.painter.ground_only()
         corners = [rolling_wheel().positions(state)[0] for state in states[::20]]
         for i, (a, b) in enumerate(pairwise(corners)):
-            length = float(np.linalg.norm(b - a))
-            if length > 1e-6:
-                rod = shapes.rod(
-                    a,
-                    geometry.rotation_with_z_axis((b - a) / length),
-                    length,
-                    0.006,
-                    view.painter.text_colour,
-                )
-                picture[f"way/{i}"] = rod
-        picture["wheel/now"] = _disc_picture(
-            states[min(round(time * 20), len(states) - 1)], distance, time
-        )
+            if np.linalg.norm(b - a) > 1e-6:
+                picture[f"way/{i}"] = props.rod_between(a, b, 0.006, view.painter.text_colour)
+        now = states[min(round(time * 20), len(states) - 1)]
+        picture["wheel/now"] = _disc_picture(now, distance, time)
         ends = {"start": corners[0], "end": corners[-1]}
         if np.linalg.norm(corners[-1] - corners[0]) < 0.1:
             ends = {"start and end": corners[0]}
         for name, at in ends.items():
-            picture[f"mark/{name}"] = shapes.contact_patch(
-                at + [0.0, 0.0, 0.002], [0.0, 0.0, 1.0], 0.035
-            )
+            on_top = at + [0.0, 0.0, 0.002]
+            picture[f"mark/{name}"] = shapes.contact_patch(on_top, [0.0, 0.0, 1.0], 0.035)
             picture[f"name/{name}"] = shapes.label(at + [-0.12, -0.13, 0.0], name, 0.05)
         view.draw(picture)
         gone = states[-1].q[:2] - states[0].q[:2]
@@ -194,13 +167,8 @@ def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
             f"largest slip on the way {abs(slip):.3f} m/s"
         )
 
-    panel = slider_panel(
-        view,
-        draw,
-        distance=(0.0, 0.5, 1.0, "m"),
-        angle=(-1.5, -0.7, 1.5, "rad"),
-        time=(0.0, 1.5, 4.0, "s"),
-    )
+    distance, angle, time = (0.0, 0.5, 1.0, "m"), (-1.5, -0.7, 1.5, "rad"), (0.0, 1.5, 4.0, "s")
+    panel = slider_panel(view, draw, distance=distance, angle=angle, time=time)
     view.camera(View(-115.0, 32.0, 1.0, around=((0.4, -0.1, 0.1), 0.85)))
     return panel
 

@@ -1,6 +1,5 @@
 """Lesson 03, The space of possible motions."""
 
-from floatbase.lessons.lesson03.exercises import EXERCISES
 from floatbase.lessons.lesson03.helpers import (
     beta_direction,
     rising_solo8_eom,
@@ -10,17 +9,3 @@ from floatbase.lessons.lesson03.helpers import (
     upright_solo12,
 )
 from floatbase.lessons.lesson03.pictures import matrix_picture, motion_bars, show_beta, show_knee
-
-__all__ = [
-    "EXERCISES",
-    "beta_direction",
-    "matrix_picture",
-    "motion_bars",
-    "rising_solo8_eom",
-    "show_beta",
-    "show_knee",
-    "standing_go2_eom",
-    "standing_still_beta",
-    "tilted_go2_eom",
-    "upright_solo12",
-]  # fmt: skip

@@ -110,10 +110,8 @@ def _bar_group(title: str, colour: str, blocks: _Blocks, values: Array, most: fl
     for i, ((block, marks, unit), three) in enumerate(zip(blocks, values, strict=True)):
         drawn += svg.text((BLOCK * (i + 0.5), bottom + 28), block, 11)
         for j, (mark, value) in enumerate(zip(marks, three, strict=True)):
-            x, number = (
-                BLOCK * i + BAR * j + GAP // 2,
-                f"{value:.4g}" if abs(value) > 1e-6 * most else "0",
-            )
+            x = BLOCK * i + BAR * j + GAP // 2
+            number = f"{value:.4g}" if abs(value) > 1e-6 * most else "0"
             name = f"{title.split(',')[0]} {block} {mark}: {number} {unit}"
             bar = f"<title>{name}</title>{_bar(x, value / most, colour)}"
             drawn += f"<g>{bar}{svg.text((x + BAR / 2, bottom + 14), mark[0], 11)}</g>"

@@ -1,27 +1,10 @@
 """Lesson 04, One cost, many spaces."""
 
 from floatbase.lessons.lesson03 import tilted_go2_eom
-from floatbase.lessons.lesson04.exercises import EXERCISES
 from floatbase.lessons.lesson04.helpers import (
     DESIRED_ACCELERATION,
     MinimumCostController,
     measured_acceleration,
     rescaled_space,
 )
-from floatbase.lessons.lesson04.pictures import (
-    cost_slices,
-    level_curves,
-    show_torques,
-)
-
-__all__ = [
-    "DESIRED_ACCELERATION",
-    "EXERCISES",
-    "MinimumCostController",
-    "cost_slices",
-    "level_curves",
-    "measured_acceleration",
-    "rescaled_space",
-    "show_torques",
-    "tilted_go2_eom",
-]  # fmt: skip
+from floatbase.lessons.lesson04.pictures import cost_slices, level_curves, show_torques

@@ -13,12 +13,15 @@ from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
+    Mistake,
     NumericJudge,
     ShapeJudge,
     Verdict,
     array_or_verdict,
+    first_fault,
     function_or_verdict,
     minimiser_or_verdict,
+    stopped,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom, tilted_go2_eom
 from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, MinimumCostController
@@ -38,46 +41,37 @@ def _gradient_by_newton() -> Array:
     )
 
 
-def _gradients() -> dict[str, Callable[[], Any]]:
-    def gradient(
-        drift: float = 1.0,
-        offset: float = 1.0,
-        turned: int = 0,
-        back: Callable[[Array], Array] = np.transpose,
-    ) -> Callable[[], Array]:
-        def value() -> Array:
-            eom = tilted_go2_eom()
-            state, eta = eom.state, fb.accelerations_from_torques(eom)
-            R = state.frame_pose("base").rotation
-            desired = (DESIRED_ACCELERATION, R @ DESIRED_ACCELERATION, R.T @ DESIRED_ACCELERATION)[
-                turned
-            ]
-            J = state.com_jacobian
-            return back(eta.A) @ J.T @ (offset * J @ eta.b + drift * state.com_drift - desired)
-
-        return value
-
-    right = gradient()
-    return {
-        "zero": lambda: np.zeros(12),
-        "sign": lambda: -right(),
-        "drift_forgotten": gradient(drift=0.0),
-        "drift_sign": gradient(drift=-1.0),
-        "offset_forgotten": gradient(offset=0.0),
-        "offset_and_drift_forgotten": gradient(drift=0.0, offset=0.0),
-        "into_world": gradient(turned=1),
-        "out_of_world": gradient(turned=2),
-        "pseudo_inverse": gradient(back=np.linalg.pinv),
-        "standing": _gradient_of_standing,
-        "half": lambda: 2 * right(),
-    }
-
-
-def _gradient_of_standing() -> Array:
-    """Return the gradient of the standing robot's cost through η of the moving robot."""
-    state = standing_go2_eom().state
-    cost = fb.Quadratic.from_residual(state.com_jacobian, DESIRED_ACCELERATION - state.com_drift)
-    return cost.pullback(fb.accelerations_from_torques(tilted_go2_eom())).g
+def _gradients() -> list[Mistake]:
+    eom = tilted_go2_eom()
+    state, eta = eom.state, fb.accelerations_from_torques(eom)
+    J, drift, offset = state.com_jacobian, state.com_drift, state.com_jacobian @ eta.b
+    back, R, desired = eta.A.T @ J.T, state.frame_pose("base").rotation, DESIRED_ACCELERATION
+    right = back @ (offset + drift - desired)
+    still = standing_go2_eom().state
+    cost_of_standing = fb.Quadratic.from_residual(still.com_jacobian, desired - still.com_drift)
+    return [
+        ("zero", np.zeros(12), "There is no answer yet. The gradient is zero at a minimum, but τ = "
+         "0 is not a minimum."),
+        ("sign", -right, "The sign is wrong. The residual is actual - desired, and the gradient "
+         "points uphill."),
+        ("drift_forgotten", back @ (offset - desired), "The drift is missing. The centre of mass "
+         "accelerates by J_c q̈ + J̇_c q̇."),
+        ("drift_sign", back @ (offset - drift - desired), "The drift has the wrong sign."),
+        ("offset_forgotten", back @ (drift - desired), "η has an offset: even with the motors off, "
+         "the robot accelerates by `eta_moving.b`."),
+        ("offset_and_drift_forgotten", back @ -desired, "The offset of η and the drift are both "
+         "missing."),
+        ("into_world", back @ (offset + drift - R @ desired), "The frame is wrong. `desired` is in "
+         "world axes, like the Jacobian and the drift. Do not rotate it."),
+        ("out_of_world", back @ (offset + drift - R.T @ desired), "The frame is wrong. `desired` "
+         "is in world axes already, and the rotation of the base takes it out of these axes."),
+        ("pseudo_inverse", np.linalg.pinv(eta.A) @ J.T @ (offset + drift - desired),
+         "A gradient comes back through the transpose of η's matrix. A pseudo-inverse is for "
+         "points."),
+        ("standing", cost_of_standing.pullback(eta).g, "This is the cost of the standing robot. "
+         "The moving robot has another Jacobian and drift."),
+        ("half", 2 * right, "The cost has a factor ½, which cancels the 2 from the square."),
+    ]  # fmt: skip
 
 
 # 04.2 ---------------------------------------------------------------------------------------------
@@ -113,7 +107,7 @@ def judge_feedback(answer: Any) -> Verdict:
             return first
         record = fb.rollout(fb.Simulation(robot), controller, RUN, [push], control_period=0.005)
     except Exception as error:  # whatever a learner's function raises
-        return Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
+        return stopped(error)
     return _parked(record)
 
 
@@ -121,39 +115,21 @@ def _parked(record: Rollout) -> Verdict:
     """Judge where the centre of mass is at the end of a run."""
     error = record.final.com - standing_go2_eom().state.com - TARGET
     missed, speed = np.linalg.norm(error), np.linalg.norm(record.final.com_velocity)
-    if record.outcome != "completed":
-        return Verdict(
-            False,
-            f"go2 falls after {record.time[-1]:.2f} s. Which sign pulls it back to the target, and "
-            f"which sign slows it down?",
-            "falls",
-        )
     left = f"{1000 * missed:.1f} mm from the target, with {1000 * speed:.0f} mm/s"
-    if speed > AT_REST:
-        return Verdict(
-            False,
-            f"The centre of mass does not come to rest: it is {left}. Add a damper, a term with "
-            f"the velocity.",
-            "swings",
-        )
-    if abs(missed - np.linalg.norm(TARGET)) < ARRIVED:
-        return Verdict(
-            False,
-            "The centre of mass stays where it was. Does your function depend on `target`?",
-            "stays",
-        )
-    if missed > ARRIVED:
-        return Verdict(
-            False,
-            f"At the end the centre of mass is {left}. Use a stiffer spring, or the position "
-            f"relative to `target`.",
-            "misses",
-        )
-    return Verdict(
+    return first_fault([
+        ("falls", record.outcome != "completed", f"go2 falls after {record.time[-1]:.2f} s. Which "
+         "sign pulls it back to the target, and which sign slows it down?"),
+        ("swings", speed > AT_REST, f"The centre of mass does not come to rest: it is {left}. Add "
+         "a damper, a term with the velocity."),
+        ("stays", abs(missed - np.linalg.norm(TARGET)) < ARRIVED, "The centre of mass stays where "
+         "it was. Does your function depend on `target`?"),
+        ("misses", missed > ARRIVED, f"At the end the centre of mass is {left}. Use a stiffer "
+         "spring, or the position relative to `target`."),
+    ]) or Verdict(
         True,
         f"go2 arrives within {1000 * missed:.2f} mm and comes back after the push. This is a "
-        f"feedback controller.",
-    )
+        "feedback controller.",
+    )  # fmt: skip
 
 
 def _feedbacks() -> list[Example]:
@@ -199,34 +175,22 @@ def _judge_design(answer: Any) -> Verdict:
     a = eom.state.com_jacobian @ eta(tau)
     turning = np.linalg.norm(eta(tau)[3:6])
     friction = np.linalg.norm(zeta(tau).reshape(4, 3)[:, :2], axis=1).max()
-    if np.linalg.norm(a + DESIRED_ACCELERATION) < 0.05:
-        return Verdict(False, "The sign is wrong: this accelerates to the right.", "sign")
-    if np.linalg.norm(a - DESIRED_ACCELERATION) > 0.01:
-        moves = (
-            f"The centre of mass accelerates by {_rounded(a)} m/s², not "
-            f"{_rounded(DESIRED_ACCELERATION)}"
-        )
-        return Verdict(False, f"{moves}. Increase the weight of this cost.", "com")
-    if turning > 0.05:
-        return Verdict(
-            False,
-            f"The centre of mass is right, but the base turns with {turning:.1f} rad/s². Which "
-            f"cost is missing?",
-            "turning",
-        )
-    if friction > 6.0:
-        most = f"the friction force at one foot is {friction:.1f} N"
-        return Verdict(
-            False,
-            f"The robot moves as desired, but {most}. The effort does not penalize friction. Use "
-            f"a cost on λ, pulled back to τ.",
-            "friction",
-        )
-    return Verdict(
+    return first_fault([
+        ("sign", np.linalg.norm(a + DESIRED_ACCELERATION) < 0.05, "The sign is wrong: this "
+         "accelerates to the right."),
+        ("com", np.linalg.norm(a - DESIRED_ACCELERATION) > 0.01, "The centre of mass accelerates "
+         f"by {_rounded(a)} m/s², not {_rounded(DESIRED_ACCELERATION)}. Increase the weight of "
+         "this cost."),
+        ("turning", turning > 0.05, "The centre of mass is right, but the base turns with "
+         f"{turning:.1f} rad/s². Which cost is missing?"),
+        ("friction", friction > 6.0, "The robot moves as desired, but the friction force at one "
+         f"foot is {friction:.1f} N. The effort does not penalize friction. Use a cost on λ, "
+         "pulled back to τ."),
+    ]) or Verdict(
         True,
-        "Three costs, each written in the space where it is simple, and added in the space of "
-        "the motors.",
-    )
+        "Three costs, each written in the space where it is simple, and added in the space of the "
+        "motors.",
+    )  # fmt: skip
 
 
 def _rounded(a: Array) -> list[float]:
@@ -256,8 +220,6 @@ def _designs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="04.1",
-        statement="The gradient of ½‖J_c q̈ + J̇_c q̇ - desired‖² at τ = 0, with respect to the "
-        "torques.",
         stub="gradient = np.zeros(12)  # replace: from eta_moving, J_moving, drift_moving, desired",
         solution="residual = J_moving @ eta_moving.b + drift_moving - desired\n"
         "gradient = eta_moving.A.T @ J_moving.T @ residual",
@@ -266,28 +228,7 @@ EXERCISES = (
                 right=_gradient_by_newton,
                 praise="This is the chain rule: points go forward through η, and gradients come "
                 "back through its transpose.",
-                mistakes=_gradients(),
-                hints={
-                    "zero": "There is no answer yet. The gradient is zero at a minimum, but τ = "
-                    "0 is not a minimum.",
-                    "sign": "The sign is wrong. The residual is actual - desired, and the "
-                    "gradient points uphill.",
-                    "drift_forgotten": "The drift is missing. The centre of mass accelerates by "
-                    "J_c q̈ + J̇_c q̇.",
-                    "drift_sign": "The drift has the wrong sign.",
-                    "offset_forgotten": "η has an offset: even with the motors off, the robot "
-                    "accelerates by `eta_moving.b`.",
-                    "offset_and_drift_forgotten": "The offset of η and the drift are both missing.",
-                    "into_world": "The frame is wrong. `desired` is in world axes, like the "
-                    "Jacobian and the drift. Do not rotate it.",
-                    "out_of_world": "The frame is wrong. `desired` is in world axes already, "
-                    "and the rotation of the base takes it out of these axes.",
-                    "pseudo_inverse": "A gradient comes back through the transpose of η's "
-                    "matrix. A pseudo-inverse is for points.",
-                    "standing": "This is the cost of the standing robot. The moving robot has "
-                    "another Jacobian and drift.",
-                    "half": "The cost has a factor ½, which cancels the 2 from the square.",
-                },
+                mistakes=_gradients,
             ),
             {
                 (18,): "18 numbers are the gradient with respect to q̈. One step back to the "
@@ -300,8 +241,6 @@ EXERCISES = (
     ),
     Exercise(
         name="04.2",
-        statement="A function of the state that returns the desired acceleration of the centre of "
-        "mass, shape (3,), m/s², world, which brings it to `target` and keeps it there.",
         stub="def go_and_stay(now):\n"
         "    return np.array([0, 0.5, 0])  # m/s², world; change it, with now and target",
         solution="def go_and_stay(now):\n"
@@ -314,8 +253,6 @@ EXERCISES = (
     ),
     Exercise(
         name="04.3",
-        statement="A cost on torques: 0.5 m/s² to the left, no turning, and at most 6 N of "
-        "friction at every foot.",
         stub="design = com.pullback(eta) + turn.pullback(eta) + 1e-4 * effort  # change or add "
         "costs",
         solution="from floatbase.objectives import tangential_bias\n\n"

@@ -78,13 +78,8 @@ def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         ax.contour(x, y, height, levels=LEVELS, colors="white", linewidths=0.8)
         flat, curved = np.linalg.eigvalsh(cost.H)
         if flat > VALLEY_RATIO * curved:
-            ax.plot(
-                *cost.minimiser(),
-                "o",
-                color=hex_code(GREYS[0]),
-                markeredgecolor="white",
-                markersize=8,
-            )
+            style = {"color": hex_code(GREYS[0]), "markeredgecolor": "white"}
+            ax.plot(*cost.minimiser(), "o", markersize=8, **style)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure

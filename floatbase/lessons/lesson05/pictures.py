@@ -146,13 +146,8 @@ def plot_constrained_minimum() -> Figure:
     ends = np.array([line([-3.5]), line([3.5])])
     axis.plot(*ends.T, color=hex_code(GREYS[1]), linewidth=3.0, label="constraint")
     axis.plot(*best, "o", color=hex_code(GREYS[0]), markersize=9, label="constrained minimum")
-    arrow: dict[str, Any] = {
-        "angles": "xy",
-        "scale_units": "xy",
-        "scale": 1.0,
-        "width": 0.011,
-        "zorder": 4,
-    }
+    arrow: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0}
+    arrow |= {"width": 0.011, "zorder": 4}
     dark = hex_code(GREYS[0])
     others = np.array([best, best + 1.2 * along])
     downhill = -0.45 * (others @ cost.H + cost.g)

@@ -1,6 +1,6 @@
 """Lesson 06, Friction cones."""
 
-from floatbase.lessons.lesson06.exercises import EXERCISES, stance_on_hill
+from floatbase.lessons.lesson06.exercises import stance_on_hill
 from floatbase.lessons.lesson06.helpers import (
     ConeController,
     accelerate,
@@ -19,22 +19,3 @@ from floatbase.lessons.lesson06.pictures import (
     show_slope,
     slope_normal,
 )
-
-__all__ = [
-    "EXERCISES",
-    "SINGLE_FOOT_VIEW",
-    "ConeController",
-    "accelerate",
-    "com_beside_feet",
-    "compass_row",
-    "constrained_minimiser",
-    "make_controller",
-    "region_picture",
-    "show_force",
-    "show_polyhedron",
-    "show_region",
-    "show_slope",
-    "slope_normal",
-    "stance_on_hill",
-    "state_with_feet_at",
-]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,12 @@ from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tang
 from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import (
     Example,
+    Mistake,
     NumericJudge,
     ShapeJudge,
     Verdict,
     array_judge,
+    first_fault,
 )
 from floatbase.lessons.lesson06.pictures import slope_normal
 from floatbase.objectives import com_wrench_map
@@ -60,6 +62,34 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
     return np.asarray(rows / np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)[:, None])
 
 
+def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
+    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
+    n = BANK / np.linalg.norm(BANK)
+    t1, t2 = tangents(n)
+    angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
+    directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
+    return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))
+
+
+def _facet_mistakes() -> list[Mistake]:
+    return [
+        ("zero", np.zeros((5, 3)), "There is no answer yet. Zero rows allow every force."),
+        ("outside", _rows_from_edges(BANK_MU / np.cos(np.pi / 5)), "That polyhedron is outside the "
+         "cone: its facets touch the cone in their middle."),
+        ("not_unit", _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK), "The normal is not a unit "
+         "vector. Normalize it before you use it for the friction term."),
+        ("sign", -_rows_from_edges(), "The sign is wrong. rows @ f ≤ 0 must hold for forces "
+         "inside."),
+        ("normal_sign", _with_tangents(-BANK_MU * np.cos(np.pi / 5)), "The sign of the normal "
+         "component is wrong. With a plus, the constraints forbid pushing."),
+        ("no_mu", _rows_from_edges(1.0), "μ is missing: these are the facets for μ = 1."),
+        ("turned", _rows_from_edges(turn=np.pi / 5), "The facets are rotated by half a facet. "
+         "Facet 0 must face t1."),
+        ("level", _rows_from_edges(normal=[0.0, 0.0, 1.0]), "These are the constraints on level "
+         "ground. Use the given normal."),
+    ]  # fmt: skip
+
+
 def _slip_angle(facets: int | None = FACETS, inside: bool = True, mu: float = MU) -> float:
     """Find the steepest slope [°] whose cone contains a vertical force, by bisection."""
     low, high = 0.0, 89.0
@@ -90,40 +120,26 @@ def _out_of_balance(f: Array) -> Verdict | None:
     state, contacts = stance_on_hill()
     weight, n = state.robot.weight, slope_normal(HILL)
     carried = weight * np.array([0.0, 0.0, 1.0])
-    missing = float(np.linalg.norm(f.sum(axis=0) - carried))
-    sums = {
-        ("no_force", "The forces do not carry the robot yet."): 0.0 * n,
-        (
-            "sign",
-            "The sign is wrong. λ is the force of the ground on the robot, and it pushes upwards.",
-        ): -carried,
-        (
-            "slides",
-            "These forces carry only the normal component of the weight, so the robot slides.",
-        ): weight * n[2] * n,
-        (
-            "along_normal",
-            "Their sum has the magnitude of the weight, but it is along the normal of the "
-            "slope. Gravity is vertical.",
-        ): weight * n,
-    }
-    for (hint, text), total in sums.items():
-        if np.linalg.norm(f.sum(axis=0) - total) < BALANCE:
-            return Verdict(False, text, hint)
-    if missing > BALANCE:
-        return Verdict(
-            False,
-            f"The sum differs by {missing:.1f} N from the force that carries the weight.",
-            "sum",
-        )
+    total = f.sum(axis=0)
+    missing = np.linalg.norm(total - carried)
     moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
-    if moment > BALANCE:
-        return Verdict(
-            False,
-            f"The sum is right, but a moment of {moment:.1f} N·m remains: go2 would turn over.",
-            "moment",
-        )
-    return None
+
+    def is_near(force: Array) -> bool:
+        return bool(np.linalg.norm(total - force) < BALANCE)
+
+    return first_fault([
+        ("no_force", is_near(0.0 * n), "The forces do not carry the robot yet."),
+        ("sign", is_near(-carried), "The sign is wrong. λ is the force of the ground on the robot, "
+         "and it pushes upwards."),
+        ("slides", is_near(weight * n[2] * n), "These forces carry only the normal component of "
+         "the weight, so the robot slides."),
+        ("along_normal", is_near(weight * n), "Their sum has the magnitude of the weight, but it "
+         "is along the normal of the slope. Gravity is vertical."),
+        ("sum", missing > BALANCE, f"The sum differs by {missing:.1f} N from the force that "
+         "carries the weight."),
+        ("moment", moment > BALANCE, f"The sum is right, but a moment of {moment:.1f} N·m remains: "
+         "go2 would turn over."),
+    ])  # fmt: skip
 
 
 def _judge_margins(f: Array) -> Verdict:
@@ -133,38 +149,23 @@ def _judge_margins(f: Array) -> Verdict:
     upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
     least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
     if margins.min() >= MARGIN - SOLVED:
-        return Verdict(
-            True,
-            f"The forces are balanced. The smallest margin is {margins.min():.1f} N.",
-        )
-    if np.abs(f[:, :2]).max() < BALANCE and margins.min() >= -BALANCE:
-        return Verdict(
-            False,
-            f"Vertical forces are balanced and inside their cones, but {least} only. Internal "
-            f"forces can give some of the front feet's tangential force to the rear feet.",
-            "upright",
-        )
-    if np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE:
-        return Verdict(
-            False,
-            f"The forces are balanced. But all feet have the same tangential force, and the upper "
-            f"feet carry little: {least}.",
-            "alike",
-        )
-    if margins.min() >= -BALANCE:
-        return Verdict(
-            False, f"The forces are balanced and inside their cones, but {least} only.", "in_cones"
-        )
-    if upright.min() >= MARGIN:
-        return Verdict(
-            False,
-            f"The forces are balanced and have enough margin in cones about the vertical. But in "
-            f"the cones about the slope's normal, {least}.",
-            "vertical_cones",
-        )
-    return Verdict(
+        text = f"The forces are balanced. The smallest margin is {margins.min():.1f} N."
+        return Verdict(True, text)
+    return first_fault([
+        ("upright", np.abs(f[:, :2]).max() < BALANCE and margins.min() >= -BALANCE,
+         f"Vertical forces are balanced and inside their cones, but {least} only. Internal forces "
+         "can give some of the front feet's tangential force to the rear feet."),
+        ("alike", np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE,
+         "The forces are balanced. But all feet have the same tangential force, and the upper feet "
+         f"carry little: {least}."),
+        ("in_cones", margins.min() >= -BALANCE, "The forces are balanced and inside their cones, "
+         f"but {least} only."),
+        ("vertical_cones", upright.min() >= MARGIN, "The forces are balanced and have enough "
+         "margin in cones about the vertical. But in the cones about the slope's normal, "
+         f"{least}."),
+    ]) or Verdict(
         False, f"The forces are balanced, but one is outside its cone: {least}.", "outside"
-    )
+    )  # fmt: skip
 
 
 def _in_balance(facets: int, room: float) -> Array:
@@ -205,44 +206,39 @@ def _forces() -> list[Example]:
     ]  # fmt: skip
 
 
+def _slope_mistakes(mu: float) -> list[Mistake]:
+    return [
+        ("45", 45.0, "At 45°, a vertical force needs μ = 1."),
+        ("radians", np.deg2rad(_slip_angle(mu=mu)), "That is in radians."),
+        ("round", _slip_angle(None, mu=mu), "That is the round cone. A facet faces uphill, in the "
+         "direction of this force, and its middle allows less than μ."),
+        ("round_radians", np.deg2rad(_slip_angle(None, mu=mu)), "That is the angle in radians, and "
+         "for the round cone."),
+        ("sine", np.rad2deg(np.arcsin(mu * np.cos(np.pi / 8))), "This uses a sine. On a slope, α_∥ "
+         "/ α_⊥ is a tangent."),
+        ("round_sine", np.rad2deg(np.arcsin(mu)), "This uses a sine and the round cone. α_∥ / α_⊥ "
+         "is a tangent, and a facet allows less than μ."),
+        ("four_facets", _slip_angle(4, mu=mu), "That is for 4 facets, as before. Here there are "
+         "8."),
+        ("outside", np.rad2deg(np.arctan(mu / np.cos(np.pi / 8))), "That is for facets outside the "
+         "cone. What does the middle of a facet allow inside?"),
+        ("cosine_on_angle", _slip_angle(None, mu=mu) * np.cos(np.pi / 8),
+         "This multiplies the angle by the cosine. The cosine belongs to μ."),
+    ]  # fmt: skip
+
+
 def _slope_judge(mu: float = MU) -> NumericJudge:
     """Return the judge of exercise 06.2 for a friction coefficient."""
     return NumericJudge(
         right=lambda: _slip_angle(mu=mu),
         praise="This is less than for the cone itself, because the facets are flat.",
-        mistakes={
-            "45": lambda: 45.0,
-            "radians": lambda: np.deg2rad(_slip_angle(mu=mu)),
-            "round": partial(_slip_angle, None, mu=mu),
-            "round_radians": lambda: np.deg2rad(_slip_angle(None, mu=mu)),
-            "sine": lambda: np.rad2deg(np.arcsin(mu * np.cos(np.pi / 8))),
-            "round_sine": lambda: np.rad2deg(np.arcsin(mu)),
-            "four_facets": partial(_slip_angle, 4, mu=mu),
-            "outside": lambda: np.rad2deg(np.arctan(mu / np.cos(np.pi / 8))),
-            "cosine_on_angle": lambda: _slip_angle(None, mu=mu) * np.cos(np.pi / 8),
-        },
-        hints={
-            "45": "At 45°, a vertical force needs μ = 1.",
-            "radians": "That is in radians.",
-            "round": "That is the round cone. A facet faces uphill, in the direction of "
-            "this force, and its middle allows less than μ.",
-            "round_radians": "That is the angle in radians, and for the round cone.",
-            "sine": "This uses a sine. On a slope, α_∥ / α_⊥ is a tangent.",
-            "round_sine": "This uses a sine and the round cone. α_∥ / α_⊥ is a tangent, and "
-            "a facet allows less than μ.",
-            "four_facets": "That is for 4 facets, as before. Here there are 8.",
-            "outside": "That is for facets outside the cone. What does the middle of a "
-            "facet allow inside?",
-            "cosine_on_angle": "This multiplies the angle by the cosine. The cosine belongs to μ.",
-        },
+        mistakes=lambda: _slope_mistakes(mu),
     )
 
 
 EXERCISES = (
     Exercise(
         name="06.1",
-        statement="The matrix of the polyhedron inside the cone for a normal that is not a unit "
-        "vector, shape (5, 3).",
         stub="bank_rows = np.zeros((5, 3))  # replace: from bank, mu = 0.5, five facets inside",
         solution="from floatbase.friction import tangents\n\n"
         "n_bank = bank / np.linalg.norm(bank)\n"
@@ -255,29 +251,7 @@ EXERCISES = (
                 right=_rows_from_edges,
                 praise="Five half-spaces. Two of them meet at an edge, and the edges lie on the "
                 "cone.",
-                mistakes={
-                    "zero": lambda: np.zeros((5, 3)),
-                    "outside": partial(_rows_from_edges, BANK_MU / np.cos(np.pi / 5)),
-                    "not_unit": lambda: _with_tangents(BANK_MU * np.cos(np.pi / 5), BANK),
-                    "sign": lambda: -_rows_from_edges(),
-                    "normal_sign": lambda: _with_tangents(-BANK_MU * np.cos(np.pi / 5)),
-                    "no_mu": lambda: _rows_from_edges(1.0),
-                    "turned": lambda: _rows_from_edges(turn=np.pi / 5),
-                    "level": lambda: _rows_from_edges(normal=[0.0, 0.0, 1.0]),
-                },
-                hints={
-                    "zero": "There is no answer yet. Zero rows allow every force.",
-                    "outside": "That polyhedron is outside the cone: its facets touch the cone "
-                    "in their middle.",
-                    "not_unit": "The normal is not a unit vector. Normalize it before you use "
-                    "it for the friction term.",
-                    "sign": "The sign is wrong. rows @ f ≤ 0 must hold for forces inside.",
-                    "normal_sign": "The sign of the normal component is wrong. With a plus, the "
-                    "constraints forbid pushing.",
-                    "no_mu": "μ is missing: these are the facets for μ = 1.",
-                    "turned": "The facets are rotated by half a facet. Facet 0 must face t1.",
-                    "level": "These are the constraints on level ground. Use the given normal.",
-                },
+                mistakes=_facet_mistakes,
             ),
             {
                 (3, 5): "This is the transpose. The matrix has one row for each facet.",
@@ -294,8 +268,6 @@ EXERCISES = (
     ),
     Exercise(
         name="06.2",
-        statement="The steepest slope, in degrees, on which a vertical force stays inside a "
-        "polyhedron with 8 facets inside the cone, μ = 0.7.",
         stub="steepest = 45.0  # degrees; replace by your expression",
         solution="steepest = np.rad2deg(np.arctan(0.7 * np.cos(np.pi / 8)))",
         judge=_slope_judge(),
@@ -305,8 +277,6 @@ EXERCISES = (
     ),
     Exercise(
         name="06.3",
-        statement="Forces on a slope of 20°, shape (12,), N, world, that are balanced and each "
-        "have a margin of 9 N to their round cone.",
         stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
         solution="from floatbase.friction import FrictionPolyhedron\n"
         "from floatbase.objectives import wrench_objective\n\n"
@@ -324,12 +294,3 @@ EXERCISES = (
         "moves tangential force from the front feet to the rear feet, which carry more.",
     ),
 )
-
-
-def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
-    """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
-    n = BANK / np.linalg.norm(BANK)
-    t1, t2 = tangents(n)
-    angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
-    directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
-    return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))

@@ -58,11 +58,9 @@ class ConeController:
     def __init__(
         self, robot: fb.Robot, contacts: fb.Contacts, state: fb.State, moment_weight: float = 1.0
     ):
-        self.robot, self.contacts, self.state = (
-            robot,
-            contacts,
-            as_instance("state", state, fb.State),
-        )
+        self.robot = robot
+        self.contacts = contacts
+        self.state = as_instance("state", state, fb.State)
         self.moment_weight = moment_weight
         cones = zip(contacts.normals, contacts.mus, strict=True)
         self._rows = block_diag(*(FrictionPolyhedron(n, mu, FACETS).face_matrix for n, mu in cones))
@@ -211,10 +209,8 @@ def com_beside_feet(robot: fb.Robot, mu: float = 1.0) -> tuple[fb.State, fb.Cont
     }
     places, normals = {}, {}
     for foot in robot.feet:
-        normals[foot.frame], y = (
-            sides[foot.frame[1]],
-            LEFT_FEET_Y if foot.frame[1] == "L" else RIGHT_FEET_Y,
-        )
+        normals[foot.frame] = sides[foot.frame[1]]
+        y = LEFT_FEET_Y if foot.frame[1] == "L" else RIGHT_FEET_Y
         at = np.array([robot.standing().frame_pose(foot.frame).translation[0], y, slope * abs(y)])
         places[foot.frame] = at + foot.radius * normals[foot.frame]
     state = state_with_feet_at(robot, [0.0, LEFT_FEET_Y + 0.03, slope * LEFT_FEET_Y + 0.2], places)

@@ -1,6 +1,5 @@
 """Lesson 07, Control as a quadratic program."""
 
-from floatbase.lessons.lesson07.exercises import EXERCISES
 from floatbase.lessons.lesson07.helpers import (
     WithConstraints,
     WithoutInequalities,
@@ -10,18 +9,4 @@ from floatbase.lessons.lesson07.helpers import (
     run_with_push,
     tuned_controller,
 )
-from floatbase.lessons.lesson07.pictures import multiplier_text, plot_com_distance, plot_one_foot
-
-__all__ = [
-    "EXERCISES",
-    "WithConstraints",
-    "WithoutInequalities",
-    "leaning_controller",
-    "make_controller",
-    "median_time_ms",
-    "multiplier_text",
-    "plot_com_distance",
-    "plot_one_foot",
-    "run_with_push",
-    "tuned_controller",
-]  # fmt: skip
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot

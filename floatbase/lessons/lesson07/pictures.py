@@ -1,21 +1,16 @@
-"""Lesson 07: a QP in the plane, displacements of the centre of mass, and multipliers."""
+"""Lesson 07: a QP in the plane, and multipliers."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from floatbase.lessons.qp_plots import plot_optimum
 from floatbase.lessons.rounding import rounded
 from floatbase.qp import QP, Solution
-from floatbase.simulation import Rollout
-from floatbase.viewer.scene.colours import GREYS, hex_code
+from floatbase.viewer.scene.colours import GREYS
 
-_STYLES = ("-", "--", ":")
 _MAX_LISTED = 4  # constraints that a note lists
 
 
@@ -36,24 +31,6 @@ def plot_one_foot() -> Axes:
     ax.set(xlabel="horizontal force [N]", ylabel="normal force [N]")
     plt.close(ax.figure)  # type: ignore[arg-type]
     return ax
-
-
-def plot_com_distance(records: Mapping[str, Rollout]) -> Figure:
-    """Plot how far the centre of mass and the feet are from their initial positions."""
-    figure, axes = plt.subplots(1, 2, figsize=(8.5, 3.2), layout="constrained")
-    for (name, record), colour, style in zip(records.items(), GREYS, _STYLES, strict=False):
-        feet = np.linalg.norm(record.foot_positions - record.foot_positions[0], axis=2).max(axis=1)
-        com = np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
-        for ax, away in zip(axes, (com, feet), strict=True):
-            ax.plot(record.time, 1e3 * away, style, color=hex_code(colour), label=name, linewidth=2)
-    for ax, title in zip(
-        axes, ("displacement of the CoM [mm]", "largest foot displacement [mm]"), strict=True
-    ):
-        ax.set(xlabel="time [s]", title=title, ylim=(0, None))
-        ax.grid(alpha=0.3)
-    axes[0].legend()
-    plt.close(figure)
-    return figure
 
 
 def multiplier_text(solution: Solution) -> str:

@@ -16,15 +16,15 @@ from matplotlib.figure import Figure
 
 import floatbase as fb
 from floatbase.behaviours import capture_point, neutral_point, support_margin
+from floatbase.lessons import props
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.lesson08.helpers import state_with_moved_body
-from floatbase.lessons.panels import live_run
+from floatbase.lessons.panels import labelled_slider, live_run
 from floatbase.lessons.slider_samples import recorded_pushes
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer import Picture, Viewer, shapes, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.thumbnail import with_thumbnail
-from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
@@ -184,11 +184,7 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
         if name in feet
     ]
     if len(ends) == 2:
-        way = ends[1] - ends[0]
-        length = float(np.linalg.norm(way))
-        picture["line"] = shapes.rod(
-            ends[0], geometry.rotation_with_z_axis(way / length), length, _PATCH_HEIGHT, GREYS[1]
-        )
+        picture["line"] = props.rod_between(ends[0], ends[1], _PATCH_HEIGHT, GREYS[1])
     return picture
 
 
@@ -215,12 +211,10 @@ class PushComparison(widgets.VBox):
             self.views[title].show(sim.state, contacts=sim.feet, cones=False)
             self.runs[title] = live_run(sim, one, self.views[title])
             self.runs[title].on_status(partial(self._tell, title))
-        self.force = _slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
-        self.towards = _slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
-        self.push_button, self.reset_button = (
-            widgets.Button(description="push both"),
-            widgets.Button(description="reset"),
-        )
+        self.force = labelled_slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
+        self.towards = labelled_slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
+        self.push_button = widgets.Button(description="push both")
+        self.reset_button = widgets.Button(description="reset")
         self.push_button.on_click(lambda _: self.push())
         self.reset_button.on_click(lambda _: self.reset())
         self._pictures = {title: widgets.VBox() for title in controllers}
@@ -237,9 +231,9 @@ class PushComparison(widgets.VBox):
 
     def push(self) -> None:
         """Push all robots now, for 0.1 s."""
-        angle = math.radians(self.towards.value)
+        push = fb.Push.horizontal(self.force.value, self.towards.value)
         for run in self.runs.values():
-            run.push([self.force.value * math.cos(angle), self.force.value * math.sin(angle), 0.0])
+            run.push(push.force)
 
     def reset(self) -> None:
         """Put all robots back on their feet."""
@@ -272,16 +266,3 @@ class PushComparison(widgets.VBox):
             super()._repr_mimebundle_(**kwargs),
             *(picture.children[0] for picture in self._pictures.values()),
         )
-
-
-def _slider(text: str, low: float, first: float, high: float, step: float) -> widgets.FloatSlider:
-    layout = widgets.Layout(width="60%", min_width="min(340px, 100% - 4px)")
-    return widgets.FloatSlider(
-        value=first,
-        min=low,
-        max=high,
-        step=step,
-        description=text,
-        readout_format=".0f",
-        layout=layout,
-    )

@@ -1,6 +1,6 @@
 """Lesson 09, Feet with area: the humanoid."""
 
-from floatbase.lessons.lesson09.exercises import EXERCISES, ankle_sensor_reading, run_lean
+from floatbase.lessons.lesson09.exercises import ankle_sensor_reading, run_lean
 from floatbase.lessons.lesson09.helpers import (
     PUSH_RECOVERY_WATCH_TIME,
     centre_of_pressure_path,
@@ -18,34 +18,8 @@ from floatbase.lessons.lesson09.pictures import (
     SOLES_VIEW,
     limit_kinds,
     play_resultants,
-    plot_lean,
     plot_walk,
     show_sole,
     show_soles,
     soles_picture,
 )
-
-__all__ = [
-    "EXERCISES",
-    "ONE_SOLE_VIEW",
-    "PUSH_RECOVERY_WATCH_TIME",
-    "SOLES_VIEW",
-    "ankle_sensor_reading",
-    "centre_of_pressure_path",
-    "corner_forces",
-    "leaning_controller",
-    "limit_kinds",
-    "load_talos",
-    "make_controller",
-    "make_standing_controller",
-    "outcome_text",
-    "play_resultants",
-    "plot_lean",
-    "plot_walk",
-    "run_lean",
-    "run_standing",
-    "show_sole",
-    "show_soles",
-    "single_support_rows",
-    "soles_picture",
-]  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -13,9 +12,11 @@ from floatbase.friction import FrictionPolyhedron, WrenchSet, centre_of_pressure
 from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import (
     Example,
+    Mistake,
     NumericJudge,
     Verdict,
     array_judge,
+    first_fault,
     lasting_or_verdict,
 )
 from floatbase.lessons.lesson09.helpers import (
@@ -64,15 +65,29 @@ def _pushed() -> Array:
     )[:2]
 
 
-def _read(height: float = -ANKLE, sign: float = 1.0, swap: bool = False) -> Callable[[], Array]:
-    """Return a function that computes the centre of pressure from the sensor."""
+def _pressure_mistakes() -> list[Mistake]:
+    f, (tx, ty, _) = ankle_sensor_reading()[:3], ankle_sensor_reading()[3:]
+    right = _pushed()
 
-    def value() -> Array:
-        fx, fy, fz, tx, ty, _ = ankle_sensor_reading()
-        p = sign * np.array([-ty + height * fx, tx + height * fy]) / fz
-        return p[::-1] if swap else p
+    def read(height: float) -> Array:
+        """Compute the centre of pressure at a height above the sensor."""
+        return np.array([-ty + height * f[0], tx + height * f[1]]) / f[2]
 
-    return value
+    return [
+        ("zero", np.zeros(2), "There is no answer yet: this is the point below the sensor."),
+        ("no_height", read(0.0), "The height of the ankle is missing. The formula in the lesson is "
+         "for a point on the ground."),
+        ("height_sign", read(ANKLE), "The sign of the height is wrong: the ground is below the "
+         "sensor."),
+        ("swapped", read(-ANKLE)[::-1], "x and y are swapped. A force further ahead has a moment "
+         "about y."),
+        ("no_height_swapped", read(0.0)[::-1], "The height is missing, and x and y are swapped."),
+        ("sign", -read(-ANKLE), "The sign is wrong: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0)."),
+        ("millimetres", 1e3 * right, "That is in mm. The answer must be in m."),
+        ("not_divided", right * f[2], "These are moments. Divide them by the normal force."),
+        ("whole_force", right * f[2] / np.linalg.norm(f), "The normal force is f_z alone, not the "
+         "magnitude of f."),
+    ]  # fmt: skip
 
 
 # 09.2 ---------------------------------------------------------------------------------------------
@@ -84,6 +99,39 @@ def _twist(facets: int = ROUND, mu: float = SOLE_MU, load: float = LOAD) -> floa
     cone = FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets)
     limits = WrenchSet(corners, (cone,) * 4, np.zeros(3), load, np.full(4, np.inf))
     return limits.max_scaling([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, load, 0.0, 0.0, 0.0])
+
+
+def _twist_mistakes(load: float) -> list[Mistake]:
+    right, friction = _twist(load=load), SOLE_MU * load
+    return [
+        ("zero", 0.0, "There is no answer yet."),
+        ("pyramids", _twist(4, load=load), "That is for pyramids with four facets inside the "
+         "cones. Here the cones are round."),
+        ("half_length", friction * LENGTH / 2, "That is μ f_z times half the length. The lever arm "
+         "of a corner goes from the middle to the corner."),
+        ("half_width", friction * WIDTH / 2, "That is μ f_z times half the width. The lever arm of "
+         "a corner goes from the middle to the corner."),
+        ("whole_sides", friction * np.hypot(LENGTH, WIDTH), "Use half the sides, not the sides: "
+         "the lever arms begin in the middle."),
+        ("one_corner", right / 4, "That is for one corner, but four corners carry the load."),
+        ("four_times", 4 * right, "Four corners share the load, so each has a quarter of it."),
+        ("no_mu", right / SOLE_MU, "μ is missing: friction is less than the normal force."),
+        ("mu_of_lesson", _twist(mu=MU, load=load), "That is for the μ of the lesson. Here it is "
+         "0.6."),
+        ("square", friction * (LENGTH + WIDTH) / 2, "Half the length plus half the width is the "
+         "lever arm for square pyramids. Use the distance."),
+        ("disc", 2 / 3 * friction * LENGTH / 2, "That is for a disc with the length of the sole "
+         "and uniform pressure: 2/3 μ f_z times its radius."),
+    ]  # fmt: skip
+
+
+def _twist_judge(load: float = LOAD) -> NumericJudge:
+    """Return the judge of exercise 09.2 for the force on the sole [N]."""
+    return NumericJudge(
+        right=lambda: _twist(load=load),
+        praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
+        mistakes=lambda: _twist_mistakes(load),
+    )
 
 
 # 09.3 ---------------------------------------------------------------------------------------------
@@ -104,9 +152,8 @@ def _judge_lean(given: Array) -> Verdict:
     """Judge a lean in simulation."""
     seconds, posture = given.tolist()
     if not (0.05 <= seconds <= 20.0 and 0.0 <= posture <= 1e3):
-        return Verdict(
-            False, "The time must be from 0.05 to 20 s, and the weight from 0 to 1000.", "range"
-        )
+        text = "The time must be from 0.05 to 20 s, and the weight from 0 to 1000."
+        return Verdict(False, text, "range")
     why = " Hardly any task controls the arms and the trunk." if posture < _LOOSE else ""
     record = lasting_or_verdict(lambda: run_lean(seconds, posture), why)
     return record if isinstance(record, Verdict) else _judge_record(record, seconds)
@@ -115,62 +162,35 @@ def _judge_lean(given: Array) -> Verdict:
 def _judge_record(record: Rollout, seconds: float) -> Verdict:
     """Judge a complete lean: where it ended, the centre of pressure, and the duration."""
     settled = record.time > 0.1  # the robot is put down at first
-    toes, heels = (
-        record.foot_positions[..., 0].max(axis=1),
-        record.foot_positions[..., 0].min(axis=1),
-    )
+    corners = record.foot_positions[..., 0]
+    toes, heels = corners.max(axis=1), corners.min(axis=1)
     pushed = centre_of_pressure_path(record)[:, 0]
     if np.isnan(pushed[settled]).any():
-        return Verdict(
-            False,
+        text = (
             "For a moment no corner touches the ground. Arms and trunk are thrown about. What "
-            "controls them?",
-            "in_the_air",
+            "controls them?"
         )
+        return Verdict(False, text, "in_the_air")
     ahead, behind = (1e3 * np.min(room[settled]) for room in (toes - pushed, pushed - heels))
     short = 1e3 * (record.com[0, 0] - record.final.com[0]) + 10.0 * LEAN
     where = "short" if short >= 0.0 else "too far"
     text = f"{rounded(abs(short), 'mm', floor=0.05)} {where} at the end; "
     text += f"the centre of pressure stays {rounded(ahead, 'mm', floor=0.5)} from the toes "
     text += f"and {rounded(behind, 'mm', floor=0.5)} from the heels"
-    if min(ahead, behind) < 1.0:
-        return Verdict(
-            False,
-            f"The robot tips: {text}. At an edge, the sole cannot push any harder.",
-            "tips",
-        )
-    if ahead < EDGE and abs(short) > NEAR:
-        return Verdict(
-            False,
-            f"Too close to the toes, and the lean does not reach its goal: {text}.",
-            "toes_and_short",
-        )
-    if ahead < EDGE:
-        return Verdict(
-            False,
-            f"Too close to the toes: {text}. Braking pushes there. How does it depend on the time?",
-            "toes",
-        )
-    if short > NEAR:
-        return Verdict(
-            False,
-            f"The lean does not reach its goal: {text}. Another task holds it back.",
-            "short",
-        )
-    if short < -NEAR:
-        return Verdict(
-            False,
-            f"The lean goes too far: {text}. Nothing brakes the rest of the body.",
-            "beyond",
-        )
-    if seconds > QUICK:
-        slow = rounded(seconds, "s", digits=3)
-        return Verdict(
-            False,
-            f"Everything is right, but the lean takes {slow}: {text}. It can be faster.",
-            "slow",
-        )
-    return Verdict(True, f"In simulation: {text}.")
+    return first_fault([
+        ("tips", min(ahead, behind) < 1.0, f"The robot tips: {text}. At an edge, the sole cannot "
+         "push any harder."),
+        ("toes_and_short", ahead < EDGE and abs(short) > NEAR, "Too close to the toes, and the "
+         f"lean does not reach its goal: {text}."),
+        ("toes", ahead < EDGE, f"Too close to the toes: {text}. Braking pushes there. How does it "
+         "depend on the time?"),
+        ("short", short > NEAR, f"The lean does not reach its goal: {text}. Another task holds it "
+         "back."),
+        ("beyond", short < -NEAR, f"The lean goes too far: {text}. Nothing brakes the rest of the "
+         "body."),
+        ("slow", seconds > QUICK, "Everything is right, but the lean takes "
+         f"{rounded(seconds, 's', digits=3)}: {text}. It can be faster."),
+    ]) or Verdict(True, f"In simulation: {text}.")  # fmt: skip
 
 
 def _leans() -> list[Example]:
@@ -182,92 +202,16 @@ def _leans() -> list[Example]:
     ]  # fmt: skip
 
 
-def _twist_judge(load: float = LOAD) -> NumericJudge:
-    """Return the judge of exercise 09.2 for the force on the sole [N]."""
-    return NumericJudge(
-        right=lambda: _twist(load=load),
-        praise="Each corner pushes perpendicular to its lever arm, as hard as friction allows.",
-        mistakes={
-            "zero": lambda: 0.0,
-            "pyramids": lambda: _twist(4, load=load),
-            "half_length": lambda: SOLE_MU * load * LENGTH / 2,
-            "half_width": lambda: SOLE_MU * load * WIDTH / 2,
-            "whole_sides": lambda: SOLE_MU * load * float(np.hypot(LENGTH, WIDTH)),
-            "one_corner": lambda: _twist(load=load) / 4,
-            "four_times": lambda: 4 * _twist(load=load),
-            "no_mu": lambda: _twist(load=load) / SOLE_MU,
-            "mu_of_lesson": lambda: _twist(mu=MU, load=load),
-            "square": lambda: SOLE_MU * load * (LENGTH + WIDTH) / 2,
-            "disc": lambda: 2 / 3 * SOLE_MU * load * LENGTH / 2,
-        },
-        hints={
-            "zero": "There is no answer yet.",
-            "pyramids": "That is for pyramids with four facets inside the cones. Here the "
-            "cones are round.",
-            "half_length": "That is μ f_z times half the length. The lever arm of a corner "
-            "goes from the middle to the corner.",
-            "half_width": "That is μ f_z times half the width. The lever arm of a corner "
-            "goes from the middle to the corner.",
-            "whole_sides": "Use half the sides, not the sides: the lever arms begin in the middle.",
-            "one_corner": "That is for one corner, but four corners carry the load.",
-            "four_times": "Four corners share the load, so each has a quarter of it.",
-            "no_mu": "μ is missing: friction is less than the normal force.",
-            "mu_of_lesson": "That is for the μ of the lesson. Here it is 0.6.",
-            "square": "Half the length plus half the width is the lever arm for square "
-            "pyramids. Use the distance.",
-            "disc": "That is for a disc with the length of the sole and uniform pressure: "
-            "2/3 μ f_z times its radius.",
-        },
-    )
-
-
 EXERCISES = (
     Exercise(
         name="09.1",
-        statement="The centre of pressure of the left sole, shape (2,), m, from the point below "
-        "the sensor. A sensor in the ankle, 0.107 m above the sole, reads `sensor` = (f, τ), N "
-        "and N·m, world, about itself.",
         stub="pushed_at = np.zeros(2)  # replace: forwards and to the left, m",
         solution="fx, fy, fz, tx, ty, tz = sensor\npushed_at = np.array([-ty - 0.107 * fx, tx - "
         "0.107 * fy]) / fz",
         judge=NumericJudge(
             right=_pushed,
             praise="The tangential force has a lever arm equal to the height of the ankle.",
-            mistakes={
-                "zero": lambda: np.zeros(2),
-                "no_height": _read(0.0),
-                "height_sign": _read(ANKLE),
-                "swapped": _read(swap=True),
-                "no_height_swapped": _read(0.0, swap=True),
-                "sign": lambda: (
-                    np.array(
-                        [
-                            ankle_sensor_reading()[4] + ANKLE * ankle_sensor_reading()[0],
-                            -ankle_sensor_reading()[3] + ANKLE * ankle_sensor_reading()[1],
-                        ]
-                    )
-                    / ankle_sensor_reading()[2]
-                ),
-                "millimetres": lambda: 1e3 * _pushed(),
-                "not_divided": lambda: _pushed() * ankle_sensor_reading()[2],
-                "whole_force": lambda: (
-                    _pushed()
-                    * ankle_sensor_reading()[2]
-                    / np.linalg.norm(ankle_sensor_reading()[:3])
-                ),
-            },
-            hints={
-                "zero": "There is no answer yet: this is the point below the sensor.",
-                "no_height": "The height of the ankle is missing. The formula in the lesson is "
-                "for a point on the ground.",
-                "height_sign": "The sign of the height is wrong: the ground is below the sensor.",
-                "swapped": "x and y are swapped. A force further ahead has a moment about y.",
-                "no_height_swapped": "The height is missing, and x and y are swapped.",
-                "sign": "The sign is wrong: (x, y, 0) × (0, 0, f_z) = (y f_z, -x f_z, 0).",
-                "millimetres": "That is in mm. The answer must be in m.",
-                "not_divided": "These are moments. Divide them by the normal force.",
-                "whole_force": "The normal force is f_z alone, not the magnitude of f.",
-            },
+            mistakes=_pressure_mistakes,
         ),
         examples=lambda: [(np.round(_pushed(), 5), "")],
         explanation="The moments about the point below the sensor, τ - (0, 0, -h) × f, are τ_x "
@@ -275,9 +219,6 @@ EXERCISES = (
     ),
     Exercise(
         name="09.2",
-        statement="The largest twist, N·m, that a sole of 24 cm × 10 cm withstands on a floor "
-        "with μ = 0.6. It is pressed with 400 N in its middle, without a tangential force, and "
-        "stands on four corners with round cones.",
         stub="largest_twist = 0.0  # N·m; replace by your expression",
         solution="largest_twist = 0.6 * 400 * np.hypot(0.12, 0.05)",
         judge=_twist_judge(),
@@ -289,9 +230,6 @@ EXERCISES = (
     ),
     Exercise(
         name="09.3",
-        statement="Two numbers for a lean of 6 cm forwards: its duration in seconds and the "
-        "weight of the posture. The lean must end within 2 mm of its goal, keep the centre of "
-        "pressure 15 mm away from every edge, and take at most 1.5 s.",
         stub="design = np.array([1.0, 0.1])  # seconds, weight of the posture",
         solution="design = np.array([1.5, 0.01])",
         judge=_judge_lean,

@@ -129,9 +129,8 @@ def corner_forces(
     cones = zip(sole.normals, sole.mus, strict=True)
     rows = block_diag(*(FrictionPolyhedron(n, mu, facets).face_matrix for n, mu in cones))
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))
-    weights = np.repeat(
-        [1.0, 10.0], 3
-    )  # 1 N·m counts as 10 N, its force at the corners, 10 cm away
+    # 1 N·m counts as 10 N, its force at the corners, 10 cm away
+    weights = np.repeat([1.0, 10.0], 3)
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
     return constrained_minimiser(
         cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows

@@ -124,17 +124,11 @@ def show_sole(
     view.draw(_feet_only(view, picture, "left"))
     missed = np.abs(contact_wrench(state, sole, forces, limits.reference_point) - w)
     possible = bool(np.max(limits.face_matrix @ w) <= _LIMIT_TOLERANCE * w[2])
-    summary = (
-        "corner forces exist"
-        if possible
-        else f"impossible with corner forces: {_violated_limits(limits, w)}"
-    )
-    nearest = (
-        ""
-        if possible
-        else f"closest forces: off by {missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
-    )
-    return _slice(limits, w, summary, nearest)
+    if possible:
+        return _slice(limits, w, "corner forces exist", "")
+    summary = f"impossible with corner forces: {_violated_limits(limits, w)}"
+    off = f"{missed[:3].max():.0f} N, {missed[3:].max():.0f} N·m"
+    return _slice(limits, w, summary, f"closest forces: off by {off}")
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
@@ -156,18 +150,17 @@ def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> 
     Viewer
         The viewer.
     """
-    rows = range(
-        0, len(record), max(1, round(speed / (_FRAME_RATE * (record.time[1] - record.time[0]))))
-    )
+    period = record.time[1] - record.time[0]
+    rows = range(0, len(record), max(1, round(speed / (_FRAME_RATE * period))))
     pictures = []
     for i in rows:
         state = record.state(i)
         picture = view.painter.picture(state)
         for contact, wrench in zip(record.contacts, record.planned[i].reshape(-1, 6), strict=True):
             f, tau = wrench[:3], wrench[3:]
-            ahead = (
-                np.array([-tau[1], tau[0], 0.0]) / f[2] if f[2] > MIN_FORCE else np.full(3, np.inf)
-            )
+            if f[2] <= MIN_FORCE:
+                continue
+            ahead = np.array([-tau[1], tau[0], 0.0]) / f[2]
             if np.linalg.norm(ahead) < _MAX_DISTANCE:
                 at = state.point(contact.name) + ahead
                 picture[f"planned/{contact.name}"] = shapes.arrow(
@@ -199,10 +192,8 @@ def limit_kinds(rows: npt.ArrayLike) -> list[str]:
     """
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
-    moment, twist = (
-        np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE,
-        np.abs(R[:, 5]) > _ZERO_TOLERANCE,
-    )
+    moment = np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE
+    twist = np.abs(R[:, 5]) > _ZERO_TOLERANCE
     return [
         "twisting" if t else "tipping" if m else "sliding"
         for m, t in zip(moment, twist, strict=True)
@@ -218,15 +209,11 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
     many[:, 4], many[:, 5] = -1e-3 * x * wrench[2], 0.0
     # each constraint is by_twist · twist ≤ room
     room, by_twist = -many @ limits.face_matrix.T, limits.face_matrix[:, 5]
-    up, down, free = (
-        by_twist > _ZERO_TOLERANCE,
-        by_twist < -_ZERO_TOLERANCE,
-        np.abs(by_twist) <= _ZERO_TOLERANCE,
-    )
-    highest, lowest = (
-        (room[:, up] / by_twist[up]).min(axis=1),
-        (room[:, down] / by_twist[down]).max(axis=1),
-    )
+    up = by_twist > _ZERO_TOLERANCE
+    down = by_twist < -_ZERO_TOLERANCE
+    free = np.abs(by_twist) <= _ZERO_TOLERANCE
+    highest = (room[:, up] / by_twist[up]).min(axis=1)
+    lowest = (room[:, down] / by_twist[down]).max(axis=1)
     there = (highest >= lowest) & np.all(room[:, free] >= -_ZERO_TOLERANCE * wrench[2], axis=1)
     across = np.concatenate([x[there], x[there][::-1]])
     twist = np.concatenate([highest[there], lowest[there][::-1]])
@@ -265,55 +252,13 @@ def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
         for name in step.stance:
             corners = record.contacts.only(name).positions(state)[:, :2]
             label = "_" if axis.patches else "soles"
-            axis.add_patch(
-                Polygon(
-                    corners,
-                    closed=True,
-                    color=hex_code(GREYS[2]),
-                    alpha=0.3,
-                    linewidth=0,
-                    label=label,
-                )
-            )
-    pushed, com = centre_of_pressure_path(record), record.com
-    axis.plot(
-        pushed[:, 0],
-        pushed[:, 1],
-        color=hex_code(GREYS[1]),
-        linewidth=1.5,
-        label="centre of pressure",
-    )
+            sole = Polygon(corners, color=hex_code(GREYS[2]), alpha=0.3, linewidth=0, label=label)
+            axis.add_patch(sole)
+    x, y = centre_of_pressure_path(record).T
+    axis.plot(x, y, color=hex_code(GREYS[1]), linewidth=1.5, label="centre of pressure")
+    com = record.com
     axis.plot(com[:, 0], com[:, 1], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c")
     axis.set(xlabel="forwards [m]", ylabel="to the left [m]", aspect="equal")
-    axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
-    plt.close(figure)
-    return axis
-
-
-def plot_lean(record: Rollout) -> Axes:
-    """Plot x_c and the centre of pressure along x between the edges of the soles."""
-    figure, axis = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    edges = record.foot_positions[..., 0]
-    axis.fill_between(
-        record.time,
-        edges.min(axis=1),
-        edges.max(axis=1),
-        color=hex_code(GREYS[2]),
-        alpha=0.3,
-        linewidth=0,
-        label="soles",
-    )
-    axis.plot(
-        record.time,
-        centre_of_pressure_path(record)[:, 0],
-        color=hex_code(GREYS[1]),
-        linewidth=1.5,
-        label="centre of pressure",
-    )
-    axis.plot(
-        record.time, record.com[:, 0], "--", color=hex_code(GREYS[0]), linewidth=2.5, label="x_c"
-    )
-    axis.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.15, 0.15))
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize="small")
     plt.close(figure)
     return axis

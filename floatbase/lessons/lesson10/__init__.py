@@ -1,6 +1,5 @@
 """Lesson 10, A horizon."""
 
-from floatbase.lessons.lesson10.exercises import EXERCISES, run_jump
 from floatbase.lessons.lesson10.helpers import (
     PUSH_RECOVERY_WATCH_TIME,
     angular_momentum,
@@ -8,21 +7,4 @@ from floatbase.lessons.lesson10.helpers import (
     make_walking_controller,
     mean_load,
 )
-from floatbase.lessons.lesson10.pictures import (
-    plot_loads,
-    plot_push_recovery_maps,
-    plot_step,
-)
-
-__all__ = [
-    "EXERCISES",
-    "PUSH_RECOVERY_WATCH_TIME",
-    "angular_momentum",
-    "make_controller",
-    "make_walking_controller",
-    "mean_load",
-    "plot_loads",
-    "plot_push_recovery_maps",
-    "plot_step",
-    "run_jump",
-]
+from floatbase.lessons.lesson10.pictures import plot_loads, plot_push_recovery_maps, plot_step

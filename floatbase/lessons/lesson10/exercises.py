@@ -11,7 +11,14 @@ from floatbase._validation import Array
 from floatbase.behaviours import Jump
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import Exercise
-from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
+from floatbase.lessons.judges import (
+    Example,
+    Mistake,
+    NumericJudge,
+    Verdict,
+    array_judge,
+    first_fault,
+)
 from floatbase.lessons.lesson08 import largest_tilt, run_go2
 from floatbase.simulation import Rollout
 
@@ -41,9 +48,8 @@ def _judge_jump(given: Array) -> Verdict:
     """Judge a jump in simulation."""
     height, distance = given.tolist()
     if not (0.02 <= height <= 1.0 and 0.0 <= distance <= 2.0):
-        return Verdict(
-            False, "The height must be from 0.02 to 1 m, and the distance from 0 to 2 m.", "range"
-        )
+        text = "The height must be from 0.02 to 1 m, and the distance from 0 to 2 m."
+        return Verdict(False, text, "range")
     try:
         record = run_jump(height, distance)
     except InputError as error:
@@ -53,17 +59,12 @@ def _judge_jump(given: Array) -> Verdict:
     tilt = largest_tilt(record)
     text = f"the feet land {far:.0f} mm ahead, all are {clear:.0f} mm up at the top, and the "
     text += f"body tilts by {tilt:.1f}°"
-    if record.outcome != "completed":
-        return Verdict(False, f"The robot falls: {text}.", "falls")
-    if far < FAR:
-        return Verdict(False, f"Too short: {text}.", "short")
-    if clear < CLEAR:
-        return Verdict(False, f"Too low for the bushes: {text}.", "low")
-    if tilt > TILT:
-        return Verdict(
-            False, f"The body tilts too far: {text}. Shorter flights leave less time.", "tilts"
-        )
-    return Verdict(True, f"In simulation: {text}.")
+    return first_fault([
+        ("falls", record.outcome != "completed", f"The robot falls: {text}."),
+        ("short", far < FAR, f"Too short: {text}."),
+        ("low", clear < CLEAR, f"Too low for the bushes: {text}."),
+        ("tilts", tilt > TILT, f"The body tilts too far: {text}. Shorter flights leave less time."),
+    ]) or Verdict(True, f"In simulation: {text}.")  # fmt: skip
 
 
 def _jumps() -> list[Example]:
@@ -74,35 +75,32 @@ def _jumps() -> list[Example]:
     ]  # fmt: skip
 
 
+def _push_off_mistakes() -> list[Mistake]:
+    mass, weight = fb.load("go2").mass, fb.load("go2").weight
+    return [
+        ("zero", 0.0, "There is no answer yet. How fast must the body be at take-off?"),
+        ("no_weight", weight * HEIGHT / DEPTH, "That is the force that accelerates the body. The "
+         "ground also carries the weight."),
+        ("impulse", mass * np.sqrt(2 * 9.81 * HEIGHT), "That is the impulse, N·s. Over which "
+         "distance does the force act?"),
+        ("inverse", weight * (1 + DEPTH / HEIGHT), "Crouch and height are swapped: a deeper crouch "
+         "needs less force."),
+        ("one_foot", _push_force() / 4, "That is for one foot. The question is for all four."),
+        ("mass", _push_force() / 9.81, "That uses the mass instead of the weight."),
+        ("both", weight * (HEIGHT + DEPTH) / HEIGHT / 2, "The work is force times crouch, not "
+         "force times height."),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="10.1",
-        statement="go2 crouches by 0.09 m and jumps 0.15 m high, measured from its standing "
-        "height. What constant vertical force, N, must the ground exert during the push-off?",
         stub="push_off = 0.0  # replace: N",
         solution='push_off = fb.load("go2").weight * (1 + 0.15 / 0.09)',
         judge=NumericJudge(
             right=_push_force,
             praise="The force lifts the weight through the crouch, and the rest becomes height.",
-            mistakes={
-                "zero": lambda: 0.0,
-                "no_weight": lambda: fb.load("go2").weight * HEIGHT / DEPTH,
-                "impulse": lambda: fb.load("go2").mass * np.sqrt(2 * 9.81 * HEIGHT),
-                "inverse": lambda: fb.load("go2").weight * (1 + DEPTH / HEIGHT),
-                "one_foot": lambda: _push_force() / 4,
-                "mass": lambda: _push_force() / 9.81,
-                "both": lambda: fb.load("go2").weight * (HEIGHT + DEPTH) / HEIGHT / 2,
-            },
-            hints={
-                "zero": "There is no answer yet. How fast must the body be at take-off?",
-                "no_weight": "That is the force that accelerates the body. The ground also "
-                "carries the weight.",
-                "impulse": "That is the impulse, N·s. Over which distance does the force act?",
-                "inverse": "Crouch and height are swapped: a deeper crouch needs less force.",
-                "one_foot": "That is for one foot. The question is for all four.",
-                "mass": "That uses the mass instead of the weight.",
-                "both": "The work is force times crouch, not force times height.",
-            },
+            mistakes=_push_off_mistakes,
         ),
         explanation="The work of the force in the crouch, F d, lifts the body by d + h. So F = "
         "m g (1 + h / d).",
@@ -110,9 +108,6 @@ EXERCISES = (
     ),
     Exercise(
         name="10.2",
-        statement="A jump over bushes, (height, distance), in m. All feet must land at least "
-        "580 mm ahead, and all must be at least 155 mm above the ground at the top. The body "
-        "must not tilt by more than 4°.",
         stub="jump_over = np.array([0.05, 0.3])  # height, distance, m",
         solution="jump_over = np.array([0.12, 0.6])",
         judge=_judge_jump,

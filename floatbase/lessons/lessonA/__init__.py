@@ -1,6 +1,5 @@
 """Lesson A, Fictitious forces."""
 
-from floatbase.lessons.lessonA.exercises import EXERCISES
 from floatbase.lessons.lessonA.helpers import elliptic_rotation, figure_of_eight, tool_error
 from floatbase.lessons.lessonA.pictures import (
     SIDE_VIEW,
@@ -10,16 +9,3 @@ from floatbase.lessons.lessonA.pictures import (
     show_tumble,
     show_turntable,
 )
-
-__all__ = [
-    "EXERCISES",
-    "SIDE_VIEW",
-    "TABLE_VIEW",
-    "elliptic_rotation",
-    "figure_of_eight",
-    "play_travelling_feet",
-    "plot_errors",
-    "show_tumble",
-    "show_turntable",
-    "tool_error",
-]  # fmt: skip

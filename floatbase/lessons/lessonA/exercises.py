@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -12,7 +11,7 @@ from floatbase._geometry import rotation_z
 from floatbase._validation import Array
 from floatbase.dynamics import bias_forces, coriolis_matrix
 from floatbase.lessons.exercises import Exercise
-from floatbase.lessons.judges import NumericJudge
+from floatbase.lessons.judges import Mistake, NumericJudge
 
 PLATFORM_RATE, CHILD_MASS = np.array([0.0, 0.0, 0.8]), 30.0  # of exercise A.1: rad/s; kg
 # m and m/s, in the axes of the merry-go-round
@@ -37,20 +36,11 @@ def _force_on_the_walker() -> Array:
     return np.asarray(CHILD_MASS * (place(STEP) - 2.0 * place(0.0) + place(-STEP)) / STEP**2)
 
 
-def _walker(coriolis: float, inward: float, mass: float = CHILD_MASS) -> Callable[[], Array]:
-    """Return a function that combines m 2 ω × ṗ and m ω × (ω × p)."""
-
-    def force() -> Array:
-        turned = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
-        return np.asarray(
-            mass
-            * (
-                coriolis * turned
-                + inward * np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))
-            )
-        )
-
-    return force
+def _walker(coriolis: float, inward: float) -> Array:
+    """Combine m 2 ω × ṗ and m ω × (ω × p)."""
+    sideways = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
+    towards_axis = np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))
+    return np.asarray(CHILD_MASS * (coriolis * sideways + inward * towards_axis))
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
@@ -62,40 +52,91 @@ def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
     )
 
 
-def _both(fictitious_only: bool) -> Array:
-    state = arm_state(tuple(np.eye(6)[LIFT_JOINT] + np.eye(6)[ELBOW_JOINT]))
-    return np.asarray(state.h - arm_state().h if fictitious_only else state.h)
-
-
 def _velocity_part() -> Array:
     return bias_forces(arm_state(tuple(JOINT_VELOCITY))).fictitious
 
 
-def _from_differences(rate: float, slope: float, gravity: float = 0.0) -> Callable[[], Array]:
-    """Return a function that computes rate · Ṁ v + slope · ∇(vᵀ M v) + gravity · g."""
+def _floor_mistakes() -> list[Mistake]:
+    return [
+        ("zero", np.zeros(3), "Without a force, the child would move straight in the world frame, "
+         "and on a curve in these axes."),
+        ("felt", _walker(-1.0, -1.0), "That is the force that the child seems to feel. The floor "
+         "has to balance it, in the opposite direction."),
+        ("no_factor_2", _walker(0.5, 1.0), "The factor 2 is wrong. Half of 2 ω × ṗ comes from the "
+         "rotation of the velocity's axes, and half from the change of the position."),
+        ("coriolis_alone", _walker(1.0, 0.0), "That balances only the Coriolis term. The child is "
+         "also away from the axis."),
+        ("inwards_alone", _walker(0.0, 1.0), "That would be right for a child that stands still. "
+         "This child also walks."),
+        ("inwards_sign", _walker(1.0, -1.0), "The sideways part is right, but the other part has "
+         "the wrong sign: the floor has to bend the path towards the axis."),
+        ("sideways_sign", _walker(-1.0, 1.0), "The inward part is right, but the sideways part has "
+         "the wrong sign. The order in ω × ṗ matters."),
+        ("no_mass", _walker(1.0, 1.0) / CHILD_MASS, "That is an acceleration, m/s². The mass is "
+         "missing."),
+        ("weight", _walker(1.0, 1.0) + [0.0, 0.0, 9.81 * CHILD_MASS], "Only the horizontal force "
+         "is asked for. The floor also carries the weight, but that is not part of the answer."),
+    ]  # fmt: skip
 
-    def force() -> Array:
-        state = arm_state(tuple(JOINT_VELOCITY))
-        v = state.v
 
-        def inertia_derivative(direction: Array) -> Array:
-            after, before = (
-                state.replace(q=state.integrate(s * STEP * direction)).M for s in (1.0, -1.0)
-            )
-            return np.asarray((after - before) / (2.0 * STEP))
+def _pair_mistakes() -> list[Mistake]:
+    right, gravity = _pair(), arm_state().h
+    both = arm_state(tuple(np.eye(6)[LIFT_JOINT] + np.eye(6)[ELBOW_JOINT])).h
+    return [
+        ("zero", np.zeros(6), "There is no answer yet. Call h_of with the lift alone, with the "
+         "elbow alone, and with both."),
+        ("gravity_short", right - gravity, "Each call includes gravity. Here it was subtracted "
+         "once too often."),
+        ("gravity_left", right + gravity, "Gravity is still included once."),
+        ("all_of_h", both, "That is all of h with both joints moving. It includes gravity and what "
+         "each joint causes alone."),
+        ("alone_left", both - gravity, "Gravity is gone, but what each joint causes alone is still "
+         "included."),
+        ("half", 0.5 * right, "That is half of it. The sum over i and j contains the pair twice, "
+         "as (i, j) and as (j, i)."),
+        ("twice", 2.0 * right, "That is twice the pair. It appears in h(lift + elbow), and with "
+         "the opposite sign in h(lift - elbow)."),
+        ("elbow_wrist", _pair(ELBOW_JOINT, ELBOW_JOINT + 1), "Those are other joints. Counted from "
+         "0, lift is 1 and elbow is 2."),
+        ("pan_lift", _pair(0, 1), "Those are pan and lift. Counted from 0, lift is 1 and elbow is "
+         "2."),
+    ]  # fmt: skip
 
-        gradient = np.array([v @ inertia_derivative(unit) @ v for unit in np.eye(6)])
-        rate_force = rate * inertia_derivative(v) @ v
-        return np.asarray(rate_force + slope * gradient + gravity * arm_state().h)
 
-    return force
+def _velocity_mistakes() -> list[Mistake]:
+    state = arm_state(tuple(JOINT_VELOCITY))
+    v = state.v
+
+    def inertia_derivative(direction: Array) -> Array:
+        after, before = (
+            state.replace(q=state.integrate(s * STEP * direction)).M for s in (1.0, -1.0)
+        )
+        return np.asarray((after - before) / (2.0 * STEP))
+
+    rate = inertia_derivative(v) @ v  # Ṁ v
+    slope = np.array([v @ inertia_derivative(unit) @ v for unit in np.eye(6)])  # of vᵀ M v
+    return [
+        ("zero", np.zeros(6), "Nothing there yet."),
+        ("no_half_in_slope", rate - slope, "The kinetic energy is ½ vᵀ M v. The half is missing in "
+         "its gradient."),
+        ("rate_alone", rate, "That is Ṁ v alone. The gradient of the kinetic energy is missing."),
+        ("slope_sign", rate + 0.5 * slope, "The sign of the gradient is wrong. Forces change the "
+         "momentum, and the gradient is on their side of the equation."),
+        ("slope_alone", -0.5 * slope, "That is the gradient of the kinetic energy alone. The rate "
+         "of the momentum M v also contains Ṁ v."),
+        ("half_on_rate", 0.5 * rate - slope, "The half belongs to the gradient of the kinetic "
+         "energy, not to Ṁ v."),
+        ("both_halved", 0.5 * (rate - slope), "Both terms are halved. The half belongs only to the "
+         "kinetic energy."),
+        ("sign", 0.5 * slope - rate, "The sign is wrong: C v is on the same side as M q̈."),
+        ("gravity_too", rate - 0.5 * slope + arm_state().h, "This includes gravity. C v is only "
+         "the velocity part of h."),
+    ]  # fmt: skip
 
 
 EXERCISES = (
     Exercise(
         name="A.1",
-        statement="The force of the floor on a child that walks straight out on a "
-        "merry-go-round, shape (3,), N.",
         stub="floor = np.zeros(3)  # N, in the merry-go-round's axes; replace by your expression",
         solution="coriolis = -2 * np.cross(omega, p_dot)\n"
         "centrifugal = -np.cross(omega, np.cross(omega, p))\n"
@@ -104,44 +145,13 @@ EXERCISES = (
             right=_force_on_the_walker,
             praise="The force is inwards to keep the child on the disc, and sideways to keep up "
             "with it. It is a real force, from the floor.",
-            mistakes={
-                "zero": lambda: np.zeros(3),
-                "felt": _walker(-1.0, -1.0),
-                "no_factor_2": _walker(0.5, 1.0),
-                "coriolis_alone": _walker(1.0, 0.0),
-                "inwards_alone": _walker(0.0, 1.0),
-                "inwards_sign": _walker(1.0, -1.0),
-                "sideways_sign": _walker(-1.0, 1.0),
-                "no_mass": _walker(1.0, 1.0, 1.0),
-                "weight": lambda: _walker(1.0, 1.0)() + [0.0, 0.0, 9.81 * CHILD_MASS],
-            },
-            hints={
-                "zero": "Without a force, the child would move straight in the world frame, and "
-                "on a curve in these axes.",
-                "felt": "That is the force that the child seems to feel. The floor has to "
-                "balance it, in the opposite direction.",
-                "no_factor_2": "The factor 2 is wrong. Half of 2 ω × ṗ comes from the rotation "
-                "of the velocity's axes, and half from the change of the position.",
-                "coriolis_alone": "That balances only the Coriolis term. The child is also away "
-                "from the axis.",
-                "inwards_alone": "That would be right for a child that stands still. This child "
-                "also walks.",
-                "inwards_sign": "The sideways part is right, but the other part has the wrong "
-                "sign: the floor has to bend the path towards the axis.",
-                "sideways_sign": "The inward part is right, but the sideways part has the wrong "
-                "sign. The order in ω × ṗ matters.",
-                "no_mass": "That is an acceleration, m/s². The mass is missing.",
-                "weight": "Only the horizontal force is asked for. The floor also carries the "
-                "weight, but that is not part of the answer.",
-            },
+            mistakes=_floor_mistakes,
         ),
         explanation="In these axes p̈ = 0, so the real force per mass and the two fictitious "
         "terms add up to zero.",
     ),
     Exercise(
         name="A.2",
-        statement="The part of h, shape (6,), N·m, that lift and elbow of ur5 cause only "
-        "together, moving with 1 rad/s each, and that neither joint causes alone.",
         stub="pair = np.zeros(6)  # N·m; replace by calls of h_of",
         solution="lift, elbow = np.eye(6)[[1, 2]]\npair = h_of(lift + elbow) - h_of(lift) - "
         "h_of(elbow) + g",
@@ -149,41 +159,13 @@ EXERCISES = (
             right=_pair,
             praise="This is the Coriolis term of this pair. Two calls are enough: half of "
             "h(lift + elbow) - h(lift - elbow). Do you see why?",
-            mistakes={
-                "zero": lambda: np.zeros(6),
-                "gravity_short": lambda: _pair() - arm_state().h,
-                "gravity_left": lambda: _pair() + arm_state().h,
-                "all_of_h": lambda: _both(False),
-                "alone_left": lambda: _both(True),
-                "half": lambda: 0.5 * _pair(),
-                "twice": lambda: 2.0 * _pair(),
-                "elbow_wrist": lambda: _pair(ELBOW_JOINT, ELBOW_JOINT + 1),
-                "pan_lift": lambda: _pair(0, 1),
-            },
-            hints={
-                "zero": "There is no answer yet. Call h_of with the lift alone, with the elbow "
-                "alone, and with both.",
-                "gravity_short": "Each call includes gravity. Here it was subtracted once too "
-                "often.",
-                "gravity_left": "Gravity is still included once.",
-                "all_of_h": "That is all of h with both joints moving. It includes gravity and "
-                "what each joint causes alone.",
-                "alone_left": "Gravity is gone, but what each joint causes alone is still "
-                "included.",
-                "half": "That is half of it. The sum over i and j contains the pair twice, as "
-                "(i, j) and as (j, i).",
-                "twice": "That is twice the pair. It appears in h(lift + elbow), and with the "
-                "opposite sign in h(lift - elbow).",
-                "elbow_wrist": "Those are other joints. Counted from 0, lift is 1 and elbow is 2.",
-                "pan_lift": "Those are pan and lift. Counted from 0, lift is 1 and elbow is 2.",
-            },
+            mistakes=_pair_mistakes,
         ),
         explanation="h = g + Σ Γ_ij v_i v_j. Both joints moving minus each alone leaves 2 Γ_ij "
         "and minus one g, which is added back.",
     ),
     Exercise(
         name="A.3",
-        statement="C v of ur5 from M alone, by finite differences, shape (6,), N·m.",
         stub="Cv = np.zeros(6)  # N·m; replace: from M_at and differences, without h",
         solution="change = lambda way: (M_at(1e-4 * way) - M_at(-1e-4 * way)) / 2e-4\n"
         "slopes = np.array([w @ change(unit) @ w for unit in np.eye(6)])\n"
@@ -192,33 +174,7 @@ EXERCISES = (
             right=_velocity_part,
             praise="All fictitious forces follow from how the inertia changes with the posture. "
             "That is where h comes from.",
-            mistakes={
-                "zero": lambda: np.zeros(6),
-                "no_half_in_slope": _from_differences(1.0, -1.0),
-                "rate_alone": _from_differences(1.0, 0.0),
-                "slope_sign": _from_differences(1.0, 0.5),
-                "slope_alone": _from_differences(0.0, -0.5),
-                "half_on_rate": _from_differences(0.5, -1.0),
-                "both_halved": _from_differences(0.5, -0.5),
-                "sign": _from_differences(-1.0, 0.5),
-                "gravity_too": _from_differences(1.0, -0.5, 1.0),
-            },
-            hints={
-                "zero": "Nothing there yet.",
-                "no_half_in_slope": "The kinetic energy is ½ vᵀ M v. The half is missing in its "
-                "gradient.",
-                "rate_alone": "That is Ṁ v alone. The gradient of the kinetic energy is missing.",
-                "slope_sign": "The sign of the gradient is wrong. Forces change the momentum, "
-                "and the gradient is on their side of the equation.",
-                "slope_alone": "That is the gradient of the kinetic energy alone. The rate of "
-                "the momentum M v also contains Ṁ v.",
-                "half_on_rate": "The half belongs to the gradient of the kinetic energy, not to "
-                "Ṁ v.",
-                "both_halved": "Both terms are halved. The half belongs only to the kinetic "
-                "energy.",
-                "sign": "The sign is wrong: C v is on the same side as M q̈.",
-                "gravity_too": "This includes gravity. C v is only the velocity part of h.",
-            },
+            mistakes=_velocity_mistakes,
         ),
         explanation="By Lagrange, d/dt (M v) = gradient of ½ vᵀ M v + forces. So M q̈ + (Ṁ v - "
         "gradient) = forces, and the bracket is C v.",

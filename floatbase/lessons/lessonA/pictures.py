@@ -16,7 +16,6 @@ from floatbase.lessons import props, svg
 from floatbase.lessons.judges import format_vector
 from floatbase.simulation import Rollout
 from floatbase.viewer import Picture, View, Viewer, shapes
-from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 TABLE_RADIUS, TABLE_HEIGHT = 1.0, 0.3  # m: radius of the turntable, and height of its top
@@ -72,21 +71,14 @@ def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str
 def _path(name: str, points: Array, radius: float, colour: tuple[float, float, float]) -> Picture:
     """Return rods that connect points in the world frame [m]."""
     return {
-        f"{name}/{i}": rod
+        f"{name}/{i}": props.rod_between(a, b, radius, colour)
         for i, (a, b) in enumerate(pairwise(points))
-        if (rod := _rod(a, b, radius, colour))
+        if _are_apart(a, b)
     }
 
 
-def _rod(
-    a: Array, b: Array, radius: float, colour: tuple[float, float, float]
-) -> shapes.Item | None:
-    length = float(np.linalg.norm(b - a))
-    return (
-        shapes.rod(a, geometry.rotation_with_z_axis((b - a) / length), length, radius, colour)
-        if length > MIN_ROD_LENGTH / 10
-        else None
-    )
+def _are_apart(a: Array, b: Array) -> bool:
+    return bool(np.linalg.norm(b - a) > MIN_ROD_LENGTH / 10)
 
 
 def _riders_drawing(position: Array, centrifugal: Array, coriolis: Array) -> str:
@@ -256,8 +248,9 @@ def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> V
         for j, (a, b) in enumerate(zip(home, contacts.positions(state), strict=True)):
             pin = np.array([a[0] + np.sign(a[0]) * PIN_DISTANCE, a[1], 0.006])
             drawn[f"pin/{j}"] = shapes.rod(pin, np.eye(3), 0.05, 0.004, GREYS[0])
-            if rod := _rod(pin, np.array([pin[0], b[1], pin[2]]), 0.006, GREYS[0]):
-                drawn[f"way/{j}"] = rod
+            beside = np.array([pin[0], b[1], pin[2]])
+            if _are_apart(pin, beside):
+                drawn[f"way/{j}"] = props.rod_between(pin, beside, 0.006, GREYS[0])
         return drawn
 
     view.play_pictures(record.time[rows], [picture(int(i)) for i in rows], speed=speed)

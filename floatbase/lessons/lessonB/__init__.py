@@ -1,6 +1,5 @@
 """Lesson B, Torque is an abstraction."""
 
-from floatbase.lessons.lessonB.exercises import EXERCISES
 from floatbase.lessons.lessonB.helpers import (
     Bench,
     hold_then_turn,
@@ -17,19 +16,3 @@ from floatbase.lessons.lessonB.pictures import (
     show_crank,
     show_torque_step,
 )
-
-__all__ = [
-    "EXERCISES",
-    "JOINT_VIEW",
-    "Bench",
-    "draw_cylinder",
-    "hold_then_turn",
-    "plot_com_sway",
-    "plot_power",
-    "plot_torques",
-    "push_response",
-    "run_force_loop",
-    "show_crank",
-    "show_torque_step",
-    "squat",
-]  # fmt: skip

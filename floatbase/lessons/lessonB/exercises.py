@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from floatbase._validation import Array
 from floatbase.lessons.exercises import Exercise
-from floatbase.lessons.judges import Example, NumericJudge, Verdict, array_judge
+from floatbase.lessons.judges import (
+    Example,
+    Mistake,
+    NumericJudge,
+    Verdict,
+    array_judge,
+    first_fault,
+)
 from floatbase.lessons.lessonB.helpers import push_response
 from floatbase.lessons.rounding import rounded
 
@@ -32,69 +37,37 @@ def _torque() -> float:
     return PISTON * (_length(GAMMA + STEP) - _length(GAMMA - STEP)) / (2.0 * STEP)
 
 
-def _valve_opening(error: Callable[[Array, Array], Array]) -> Callable[[], Array]:
-    """Return a function that computes k times an error of the desired and actual piston force."""
-    return lambda: np.asarray(GAIN * error(WANTED / LEVER, GOT / LEVER))
-
-
 @array_judge((2,))
 def _judge_gains(given: Array) -> Verdict:
     """Judge gains by whether go2 with 5 Hz actuators comes back to within a millimetre."""
     kp, kd = map(float, given)
-    if min(kp, kd) <= 0.0:
-        return Verdict(
-            False,
-            "A gain must be above zero. Otherwise it has no effect or pushes the robot away.",
-            "not_above_zero",
-        )
-    if kp < kd:
-        return Verdict(
-            False,
-            "kp in 1/s² comes first, then kd in 1/s. Here kp is the smaller number.",
-            "swapped",
-        )
-    if kd > MOST_DAMPING:
-        return Verdict(
-            False,
-            f"kd = {rounded(kd)} is more than {MOST_DAMPING:g}, the limit for the measured "
-            f"velocities.",
-            "damping",
-        )
+    fault = first_fault([
+        ("not_above_zero", min(kp, kd) <= 0.0, "A gain must be above zero. Otherwise it has no "
+         "effect or pushes the robot away."),
+        ("swapped", kp < kd, "kp in 1/s² comes first, then kd in 1/s. Here kp is the smaller "
+         "number."),
+        ("damping", kd > MOST_DAMPING, f"kd = {rounded(kd)} is more than {MOST_DAMPING:g}, the "
+         "limit for the measured velocities."),
+    ])  # fmt: skip
+    if fault:
+        return fault
     outcome, off, swing = push_response(kp, kd)
     far = f"{rounded(off)} mm off at the end"
-    if outcome != "completed" or off > LOST:
-        what = far if outcome == "completed" else outcome
-        if kp < SOFT:
-            return Verdict(
-                False,
-                f"{what}: the gains are too low. The leakage pushes the robot aside before the "
-                f"force loops have compensated for it.",
-                "soft",
-            )
-        return Verdict(
-            False,
-            f"{what}: kp is far too high for this kd. A delayed torque amplifies the oscillation "
-            f"that it should damp.",
-            "hard",
-        )
-    if off <= NEAR_HOME:
-        return Verdict(
-            True,
-            f"{far}: stiff enough for the leakage, and not too stiff for the delayed torque.",
-        )
-    if swing > off:
-        why = (
-            "The delay matters more for a fast oscillation. Reduce kp, or increase kd if possible."
-        )
-        return Verdict(
-            False, f"{far}, and the robot still oscillates by {rounded(swing)} mm. {why}", "swings"
-        )
-    return Verdict(
-        False,
-        f"{far}, but nearly at rest there. The leakage pushes the robot aside, and kp is the "
-        f"spring that resists.",
-        "leaks",
-    )
+    lost = outcome != "completed" or off > LOST
+    what = far if outcome == "completed" else outcome
+    return first_fault([
+        ("soft", lost and kp < SOFT, f"{what}: the gains are too low. The leakage pushes the robot "
+         "aside before the force loops have compensated for it."),
+        ("hard", lost, f"{what}: kp is far too high for this kd. A delayed torque amplifies the "
+         "oscillation that it should damp."),
+        ("swings", off > NEAR_HOME and swing > off, f"{far}, and the robot still oscillates by "
+         f"{rounded(swing)} mm. The delay matters more for a fast oscillation. Reduce kp, or "
+         "increase kd if possible."),
+        ("leaks", off > NEAR_HOME, f"{far}, but nearly at rest there. The leakage pushes the robot "
+         "aside, and kp is the spring that resists."),
+    ]) or Verdict(
+        True, f"{far}: stiff enough for the leakage, and not too stiff for the delayed torque."
+    )  # fmt: skip
 
 
 def _gains() -> list[Example]:
@@ -106,10 +79,59 @@ def _gains() -> list[Example]:
     ]  # fmt: skip
 
 
+def _torque_mistakes() -> list[Mistake]:
+    force, a, b, gamma, length = PISTON, FOOT, CRANK, GAMMA, _length(GAMMA)
+    wrong_length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(50.0))  # degrees as radians
+    return [
+        ("square", force * b, "That would be right if crank and cylinder were perpendicular, but "
+         "here they are not."),
+        ("sin_gamma", force * b * np.sin(gamma), "γ is the angle at the joint, between the crank "
+         "and the foot of the cylinder. The angle that matters is between the crank and the "
+         "cylinder, which is the direction of the force."),
+        ("cosine", force * b * np.cos(gamma), "The cosine gives the component along the crank, "
+         "which has no lever arm. And γ is not the angle between crank and cylinder."),
+        ("other_side", force * b * b * np.sin(gamma) / length, "That is the crank times the sine "
+         "of the angle at the foot. That sine belongs to the other side, a."),
+        ("foot_lever", force * a * np.sin(gamma), "That lever arm is a sin γ: the distance of the "
+         "foot from the line of the crank."),
+        ("not_divided", force * a * b * np.sin(gamma), "The derivative of ℓ²/2 is a b sin γ. You "
+         "need the derivative of ℓ, so divide by ℓ."),
+        ("cosine_derivative", force * a * b * np.cos(gamma) / length, "The derivative of the "
+         "cosine is a sine."),
+        ("degrees", force * a * b * np.sin(50.0) / wrong_length, "np.sin and np.cos take radians. "
+         "This is the sine of 50 radians."),
+        ("plus", force * a * b * np.sin(gamma) / _length(gamma, 1.0), "The law of cosines has a "
+         "minus. At γ = 0 the crank points to the foot, and ℓ is shortest."),
+        ("lever_alone", _torque() / force, "That is the lever arm, in m. The torque is the force "
+         "of the piston times the lever arm."),
+    ]  # fmt: skip
+
+
+def _valve_mistakes() -> list[Mistake]:
+    wanted, got, error = WANTED / LEVER, GOT / LEVER, GAIN * (WANTED - GOT)
+    return [
+        ("torque_error", error, "That is the error of the torque, but the piston only knows its "
+         "force. Which force should it have?"),
+        ("sizes", GAIN * (abs(wanted) - abs(got)), "It is not enough to open the valve more when "
+         "the force is too small. For a stronger *pull*, the valve must open to the other side."),
+        ("no_sign", GAIN * abs(wanted - got), "A sign is lost: u says to which side the valve "
+         "opens."),
+        ("sign", GAIN * (got - wanted), "All signs are wrong: this lets oil out where it is "
+         "missing."),
+        ("no_lever_sign", error / abs(LEVER), "The sign of the lever arm is lost. Beyond the dead "
+         "point, the rod must move *in* to turn the joint forwards."),
+        ("lever_sign_alone", error * np.sign(LEVER), "The sides are right. But with a short lever "
+         "arm, the same torque needs a larger force: divide by the lever arm."),
+        ("times_lever", error * LEVER, "The force is the torque divided by the lever arm, not "
+         "multiplied by it."),
+        ("no_loop", GAIN * wanted, "This opens the valve for the desired force and ignores the "
+         "actual force: it is not a feedback loop."),
+    ]  # fmt: skip
+
+
 EXERCISES = (
     Exercise(
         name="B.1",
-        statement="The torque of an excavator's cylinder on its arm, N·m.",
         stub="torque = piston * b  # N·m, if crank and cylinder were perpendicular; replace",
         namespace=lambda: {"piston": PISTON, "b": CRANK},
         solution="length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(gamma))\ntorque = piston * a * "
@@ -118,92 +140,26 @@ EXERCISES = (
             right=_torque,
             praise="The torque is force times dℓ/dq, and dℓ/dq is the distance of the joint "
             "from the line of the cylinder.",
-            mistakes={
-                "square": lambda: PISTON * CRANK,
-                "sin_gamma": lambda: PISTON * CRANK * np.sin(GAMMA),
-                "cosine": lambda: PISTON * CRANK * np.cos(GAMMA),
-                "other_side": lambda: PISTON * CRANK * CRANK * np.sin(GAMMA) / _length(GAMMA),
-                "foot_lever": lambda: PISTON * FOOT * np.sin(GAMMA),
-                "not_divided": lambda: PISTON * FOOT * CRANK * np.sin(GAMMA),
-                "cosine_derivative": lambda: PISTON * FOOT * CRANK * np.cos(GAMMA) / _length(GAMMA),
-                "degrees": lambda: (
-                    PISTON
-                    * FOOT
-                    * CRANK
-                    * np.sin(50.0)
-                    / np.sqrt(FOOT**2 + CRANK**2 - 2 * FOOT * CRANK * np.cos(50.0))
-                ),
-                "plus": lambda: PISTON * FOOT * CRANK * np.sin(GAMMA) / _length(GAMMA, 1.0),
-                "lever_alone": lambda: _torque() / PISTON,
-            },
-            hints={
-                "square": "That would be right if crank and cylinder were perpendicular, but "
-                "here they are not.",
-                "sin_gamma": "γ is the angle at the joint, between the crank and the foot of "
-                "the cylinder. The angle that matters is between the crank and the cylinder, "
-                "which is the direction of the force.",
-                "cosine": "The cosine gives the component along the crank, which has no lever "
-                "arm. And γ is not the angle between crank and cylinder.",
-                "other_side": "That is the crank times the sine of the angle at the foot. That "
-                "sine belongs to the other side, a.",
-                "foot_lever": "That lever arm is a sin γ: the distance of the foot from the "
-                "line of the crank.",
-                "not_divided": "The derivative of ℓ²/2 is a b sin γ. You need the derivative of "
-                "ℓ, so divide by ℓ.",
-                "cosine_derivative": "The derivative of the cosine is a sine.",
-                "degrees": "np.sin and np.cos take radians. This is the sine of 50 radians.",
-                "plus": "The law of cosines has a minus. At γ = 0 the crank points to the foot, "
-                "and ℓ is shortest.",
-                "lever_alone": "That is the lever arm, in m. The torque is the force of the "
-                "piston times the lever arm.",
-            },
+            mistakes=_torque_mistakes,
         ),
         explanation="ℓ² = a² + b² - 2 a b cos γ, so dℓ/dγ = a b sin γ / ℓ; and τ q̇ = F ℓ̇.",
     ),
     Exercise(
         name="B.2",
-        statement="The commands of the loop to the valve in four situations, shape (4,).",
         stub="u = k * (wanted - got)  # shape (4,); replace: an error of the piston's force",
         namespace=lambda: {"k": GAIN, "wanted": WANTED, "got": GOT},
         solution="u = k * (wanted / lever - got / lever)",
         judge=NumericJudge(
-            right=_valve_opening(lambda wanted, got: wanted - got),
+            right=lambda: GAIN * (WANTED / LEVER - GOT / LEVER),
             praise="If a pull is too weak, oil is needed on the other side. Beyond the dead "
             "point, moving out and moving in change their roles.",
-            mistakes={
-                "torque_error": lambda: GAIN * (WANTED - GOT),
-                "sizes": _valve_opening(lambda wanted, got: abs(wanted) - abs(got)),
-                "no_sign": _valve_opening(lambda wanted, got: abs(wanted - got)),
-                "sign": _valve_opening(lambda wanted, got: got - wanted),
-                "no_lever_sign": lambda: GAIN * (WANTED - GOT) / abs(LEVER),
-                "lever_sign_alone": lambda: GAIN * (WANTED - GOT) * np.sign(LEVER),
-                "times_lever": lambda: GAIN * (WANTED - GOT) * LEVER,
-                "no_loop": _valve_opening(lambda wanted, got: wanted),
-            },
-            hints={
-                "torque_error": "That is the error of the torque, but the piston only knows its "
-                "force. Which force should it have?",
-                "sizes": "It is not enough to open the valve more when the force is too small. "
-                "For a stronger *pull*, the valve must open to the other side.",
-                "no_sign": "A sign is lost: u says to which side the valve opens.",
-                "sign": "All signs are wrong: this lets oil out where it is missing.",
-                "no_lever_sign": "The sign of the lever arm is lost. Beyond the dead point, the "
-                "rod must move *in* to turn the joint forwards.",
-                "lever_sign_alone": "The sides are right. But with a short lever arm, the same "
-                "torque needs a larger force: divide by the lever arm.",
-                "times_lever": "The force is the torque divided by the lever arm, not "
-                "multiplied by it.",
-                "no_loop": "This opens the valve for the desired force and ignores the actual "
-                "force: it is not a feedback loop.",
-            },
+            mistakes=_valve_mistakes,
         ),
         explanation="F = τ / L, with the sign of L. u > 0 feeds A, and the force increases. u < "
         "0 feeds B, and the force decreases.",
     ),
     Exercise(
         name="B.3",
-        statement="Gains kp and kd ≤ 20 with which go2, with force loops of 5 Hz, comes back to "
-        "within 1 mm.",
         stub="gains = (100.0, 20.0)  # kp in 1/s², kd in 1/s; kd at most 20; replace",
         solution="gains = (490.0, 20.0)",
         judge=_judge_gains,

@@ -17,7 +17,6 @@ from floatbase.lessons.lessonB.helpers import Bench, BenchSample, hold_then_turn
 from floatbase.lessons.rounding import rounded
 from floatbase.simulation import Rollout
 from floatbase.viewer import View, Viewer, prefixed, shapes
-from floatbase.viewer.scene import geometry
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 BAR = 1e5  # Pa
@@ -60,14 +59,8 @@ def draw_cylinder(u: float) -> str:
     drawn += svg.polygon(corners, **body)
     middle = (top + bottom) / 2
     for start, end, half in ((piston, piston + 16, 39.0), (piston + 16, right + 90, 9.0)):
-        corners = np.array(
-            [
-                [start, middle - half],
-                [end, middle - half],
-                [end, middle + half],
-                [start, middle + half],
-            ]
-        )
+        low, high = middle - half, middle + half
+        corners = np.array([[start, low], [end, low], [end, high], [start, high]])
         drawn += svg.polygon(corners, fill=hex_code(GREYS[2]), stroke="currentColor")
     drawn += svg.text((piston + 8, top - 10), "piston") + svg.text((right + 60, middle - 18), "rod")
     low, supply, tank = 190.0, 140.0, 330.0  # the valve's box, and where its lines begin below
@@ -116,10 +109,8 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
     gamma = np.arccos(bench.crank / bench.base) + bench.angle
     foot = JOINT + [0.0, 0.0, DRAWING_SCALE * bench.base]
     end = JOINT + DRAWING_SCALE * bench.crank * _towards(gamma)
-    stroke = (
-        DRAWING_SCALE * (bench.base - bench.crank),
-        DRAWING_SCALE * (bench.base + bench.crank),
-    )
+    shortest, longest = bench.base - bench.crank, bench.base + bench.crank
+    stroke = DRAWING_SCALE * shortest, DRAWING_SCALE * longest
     least, most = bench.torque_range()
     a, b = _pressures(bench, min(most, max(least, torque)))
     supply = bench.hydraulics.supply_pressure
@@ -137,18 +128,10 @@ def show_crank(view: Viewer, angle: float, torque: float) -> str:
         ("crank", JOINT, end, 0.016),
         ("shank", JOINT, JOINT + SHANK_LENGTH * _towards(gamma + BEND), 0.02),
     ):
-        way = tip - start
-        length = float(np.linalg.norm(way))
         aside = np.array([0.0, 0.09 if name == "thigh" else 0.0, 0.0])  # behind the cylinder
-        picture[name] = shapes.rod(
-            start + aside, geometry.rotation_with_z_axis(way / length), length, radius, GREYS[1]
-        )
-    picture["joint"] = shapes.rod(
-        JOINT + [0.0, -0.05, 0.0],
-        geometry.rotation_with_z_axis([0.0, 1.0, 0.0]),
-        0.16,
-        0.028,
-        GREYS[0],
+        picture[name] = props.rod_between(start + aside, tip + aside, radius, GREYS[1])
+    picture["joint"] = props.rod_between(
+        JOINT + [0.0, -0.05, 0.0], JOINT + [0.0, 0.11, 0.0], 0.028, GREYS[0]
     )
     view.draw(picture)
     summary = (
@@ -167,11 +150,8 @@ def _towards(gamma: float) -> Array:
 
 def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
     """Return the pressures of both chambers for a torque [Pa]."""
-    h = bench.hydraulics
-    lines, force = (
-        h.supply_pressure + h.tank_pressure,
-        torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0,
-    )
+    lines = bench.hydraulics.supply_pressure + bench.hydraulics.tank_pressure
+    force = torque / bench.lever if abs(bench.lever) > 1e-6 else 0.0
     a = (force + bench.ring_area * lines) / (bench.piston_area + bench.ring_area)
     return a, lines - a
 
@@ -195,15 +175,8 @@ def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0
     axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
     for i, (name, rows) in enumerate(runs.items()):
         times, torques = [1000 * row.time for row in rows], [row.torque for row in rows]
-        axis.plot(
-            times,
-            torques,
-            DASHES[i % 4],
-            color=hex_code(GREYS[min(i, 2)]),
-            linewidth=1.8,
-            label=name,
-        )
-    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        _plot_curve(axis, i, times, torques, name)
+    _add_legend(axis)
     return axis
 
 
@@ -225,16 +198,9 @@ def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
     axis = _axes("time [s]", f"CoM shift to the {'left' if side > 0 else 'right'} [mm]")
     for i, (name, record) in enumerate(records.items()):
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
-        axis.plot(
-            record.time - record.time[0],
-            gone,
-            DASHES[i % 4],
-            color=hex_code(GREYS[i % 3]),
-            linewidth=1.8,
-            label=name,
-        )
+        _plot_curve(axis, i, record.time - record.time[0], gone, name)
     axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
-    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _add_legend(axis)
     return axis
 
 
@@ -258,16 +224,8 @@ def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -
     axis = _axes("time [s]", "power [W]")
     watts = np.asarray(watts)
     for i, name in enumerate(names):
-        times = step * np.arange(len(watts))
-        axis.plot(
-            times,
-            watts[:, i],
-            DASHES[i % 4],
-            color=hex_code(GREYS[i % 3]),
-            linewidth=1.8,
-            label=name,
-        )
-    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        _plot_curve(axis, i, step * np.arange(len(watts)), watts[:, i], name)
+    _add_legend(axis)
     return axis
 
 
@@ -276,6 +234,16 @@ def _axes(x: str, y: str) -> Axes:
     axis.set(xlabel=x, ylabel=y)
     axis.grid(alpha=0.25)
     return axis
+
+
+def _plot_curve(axis: Axes, i: int, x: npt.ArrayLike, y: npt.ArrayLike, name: str) -> None:
+    """Plot curve number i with its own dashes and shade."""
+    color = hex_code(GREYS[i % 3])
+    axis.plot(x, y, DASHES[i % 4], color=color, linewidth=1.8, label=name)
+
+
+def _add_legend(axis: Axes) -> None:
+    axis.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:

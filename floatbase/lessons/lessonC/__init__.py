@@ -1,7 +1,7 @@
 """Lesson C, How a QP solver thinks."""
 
 from floatbase.lessons.controllers import SolverController
-from floatbase.lessons.lessonC.exercises import EXERCISES, rounds_from_guess
+from floatbase.lessons.lessonC.exercises import rounds_from_guess
 from floatbase.lessons.lessonC.helpers import (
     LimitedActiveSet,
     answer_or_default,
@@ -21,24 +21,3 @@ from floatbase.lessons.lessonC.pictures import (
     show_solver_path,
     show_table,
 )
-
-__all__ = [
-    "EXERCISES",
-    "ActiveSetGame",
-    "LimitedActiveSet",
-    "SolverController",
-    "answer_or_default",
-    "beale_problem",
-    "braking_qp",
-    "corner_table",
-    "hexagon_table",
-    "longest_step",
-    "plot_problem",
-    "rounds_from_guess",
-    "row_to_drop",
-    "run_with_push",
-    "show_solver_path",
-    "show_table",
-    "standing_controller",
-    "table_top",
-]  # fmt: skip

@@ -9,7 +9,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.lessons.exercises import Exercise
-from floatbase.lessons.judges import Example, NumericJudge, Verdict
+from floatbase.lessons.judges import Example, Mistake, NumericJudge, Verdict, first_fault
 from floatbase.lessons.lessonC.helpers import braking_qp
 from floatbase.lessons.lessonC.verdicts import judge_drop, judge_step
 from floatbase.qp import QP, active_set
@@ -23,14 +23,8 @@ _NONE = np.zeros((0, 2)), np.zeros(0)
 def slanted_table() -> QP:
     """Return the bowl and the slanted table of exercise C.1."""
     H = np.diag([1.0, 4.0])
-    return QP(
-        H,
-        -H @ [2.0, -2.0],
-        *_NONE,
-        np.array([[0.5, -1.0]]),
-        np.zeros(1),
-        inequality_names=("slant",),
-    )
+    slant = np.array([[0.5, -1.0]])
+    return QP(H, -H @ [2.0, -2.0], *_NONE, slant, np.zeros(1), inequality_names=("slant",))
 
 
 def _price() -> float:
@@ -43,6 +37,31 @@ def _price() -> float:
     return (low - high) / (2 * h)
 
 
+def _price_of(curvature: Sequence[float]) -> float:
+    """Return the multiplier of C.1 for another bowl, from its equations."""
+    G, H = np.array([0.5, -1.0]), np.diag(curvature)
+    low = np.array([2.0, -2.0])
+    return float(G @ low / (G @ np.linalg.solve(H, G)))
+
+
+def _price_mistakes() -> list[Mistake]:
+    right, (along, height) = _price(), fb.solve(slanted_table()).x
+    return [
+        ("sign", -right, "The sign is wrong. With H x + g + Gᵀ μ = 0, the multiplier of a table "
+         "that pushes is positive."),
+        ("length", right * np.sqrt(1.25), "That is the magnitude of the gradient. A multiplier "
+         "belongs to the constraint as it is written, and this one has a normal of length √1.25."),
+        ("level", 8.0, "That is the multiplier of a level table. Here along and up both "
+         "contribute."),
+        ("no_curvature", _price_of([1.0, 1.0]), "The curvature of 4 is missing."),
+        ("no_half", 2.0 * right, "The objective has a ½ before each square."),
+        ("along", along, "That is the position of the marble along the table."),
+        ("height", height, "That is the height of the marble."),
+        ("distance", 3.0, "That is the violation of the constraint at the lowest point of the "
+         "bowl."),
+    ]  # fmt: skip
+
+
 # C.4 ----------------------------------------------------------------------------------------------
 
 
@@ -51,34 +70,27 @@ def _judge_guess(answer: Any) -> Verdict:
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet. List the names of constraints.", "no_answer")
     if not isinstance(answer, list | tuple) or not all(isinstance(name, str) for name in answer):
-        return Verdict(
-            False,
-            "The answer must be a list of names from qp.inequality_names.",
-            "no_names",
-        )
+        text = "The answer must be a list of names from qp.inequality_names."
+        return Verdict(False, text, "no_names")
     qp = braking_qp()
     names = list(dict.fromkeys(answer))
-    if unknown := [name for name in names if name not in qp.inequality_names]:
-        return Verdict(
-            False,
-            f"There is no constraint {unknown[0]!r}. qp.inequality_names lists all of them.",
-            "no_such_row",
-        )
+    unknown = [name for name in names if name not in qp.inequality_names]
+    if unknown:
+        text = f"There is no constraint {unknown[0]!r}. qp.inequality_names lists all of them."
+        return Verdict(False, text, "no_such_row")
     if not names:
-        return Verdict(
-            False,
-            "With an empty list, the plan pulls on the ground. Which feet does the push lift off?",
-            "no_row",
+        text = (
+            "With an empty list, the plan pulls on the ground. Which feet does the push lift off?"
         )
+        return Verdict(False, text, "no_row")
     rows = [qp.inequality_names.index(name) for name in names]
     small, Z = qp.reduced, qp.reduced.G[rows]
     if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
-        return Verdict(
-            False,
+        text = (
             "These constraints depend on one another. The force of a foot has three components, so "
-            "at most three of its constraints can be on.",
-            "dependent",
+            "at most three of its constraints can be on."
         )
+        return Verdict(False, text, "dependent")
     k = len(rows)
     found = np.linalg.solve(
         np.block([[small.H, Z.T], [Z, np.zeros((k, k))]]), np.concatenate([-small.g, small.h[rows]])
@@ -86,26 +98,19 @@ def _judge_guess(answer: Any) -> Verdict:
     over, prices = small.G @ found[: small.n] - small.h, found[small.n :]
     broken = [str(qp.inequality_names[i]) for i in np.flatnonzero(over > 1e-6)]
     pulls = [name for name, price in zip(names, prices, strict=True) if price < -1e-9]
-    if not broken and not pulls:
-        return Verdict(
-            True,
-            "One system of equations, and nothing to correct. A solver that starts here needs only "
-            "one iteration.",
-        )
-    if not any("foot" in name for name in names):
-        return Verdict(
-            False,
-            "The motors are far from their limits here. What does a push do to the feet?",
-            "motors",
-        )
     faults = [f"{_count(broken)} violated, {_example_of(broken)}"] if broken else []
     faults += [f"{_count(pulls)} pulling, {_example_of(pulls)}"] if pulls else []
-    return Verdict(
-        False,
-        f"With your list, {' and '.join(faults)}. Correct the guess as the solver would, and check "
-        f"again.",
-        "corrections",
-    )
+    only_motors = not any("foot" in name for name in names)
+    return first_fault([
+        ("motors", bool(faults) and only_motors, "The motors are far from their limits here. What "
+         "does a push do to the feet?"),
+        ("corrections", bool(faults), f"With your list, {' and '.join(faults)}. Correct the guess "
+         "as the solver would, and check again."),
+    ]) or Verdict(
+        True,
+        "One system of equations, and nothing to correct. A solver that starts here needs only one "
+        "iteration.",
+    )  # fmt: skip
 
 
 def _count(names: Sequence[str]) -> str:
@@ -240,8 +245,6 @@ def _guesses() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="C.1",
-        statement="The multiplier (price) of the constraint 0.5 along - up ≤ 0 for ψ = ½(along "
-        "- 2)² + ½·4 (up + 2)².",
         stub="price = 8.0  # of a level table; replace this number",
         solution="W = [[0.5, -1]]\n"
         "KKT = np.block([[np.diag([1, 4]), np.transpose(W)], [np.array(W), np.zeros((1, 1))]])\n"
@@ -250,30 +253,7 @@ EXERCISES = (
             right=_price,
             praise="Three equations: two say that the constraint force balances the gradient, "
             "and one says that the marble lies on the table.",
-            mistakes={
-                "sign": lambda: -_price(),
-                "length": lambda: _price() * np.sqrt(1.25),
-                "level": lambda: 8.0,
-                "no_curvature": lambda: _price_of([1.0, 1.0]),
-                "no_half": lambda: 2.0 * _price(),
-                "along": lambda: float(fb.solve(slanted_table()).x[0]),
-                "height": lambda: float(fb.solve(slanted_table()).x[1]),
-                "distance": lambda: 3.0,
-            },
-            hints={
-                "sign": "The sign is wrong. With H x + g + Gᵀ μ = 0, the multiplier of a table "
-                "that pushes is positive.",
-                "length": "That is the magnitude of the gradient. A multiplier belongs to the "
-                "constraint as it is written, and this one has a normal of length √1.25.",
-                "level": "That is the multiplier of a level table. Here along and up both "
-                "contribute.",
-                "no_curvature": "The curvature of 4 is missing.",
-                "no_half": "The objective has a ½ before each square.",
-                "along": "That is the position of the marble along the table.",
-                "height": "That is the height of the marble.",
-                "distance": "That is the violation of the constraint at the lowest point of the "
-                "bowl.",
-            },
+            mistakes=_price_mistakes,
         ),
         explanation="On the constraint up = 0.5 along, ψ = ½(a - 2)² + 2(0.5 a + 2)² with a = "
         "along. This is smallest at a = -1, so the marble lies at (-1, -0.5). The gradient "
@@ -281,9 +261,6 @@ EXERCISES = (
     ),
     Exercise(
         name="C.2",
-        statement="`longest_step(x, p, G, h, W)`: the length of the step from x along p, at "
-        "most 1, for which all constraints G x ≤ h hold, and the index of the blocking "
-        "constraint, or None. The constraints in the list W hold with equality already.",
         stub=LONGEST_STEP_STUB,
         solution=LONGEST_STEP,
         judge=judge_step,
@@ -293,8 +270,6 @@ EXERCISES = (
     ),
     Exercise(
         name="C.3",
-        statement="`row_to_drop(W, prices)`: the index of the constraint in W with the most "
-        "negative multiplier (price), or None if none is negative.",
         stub=ROW_TO_DROP_STUB,
         solution=ROW_TO_DROP,
         judge=judge_drop,
@@ -304,8 +279,6 @@ EXERCISES = (
     ),
     Exercise(
         name="C.4",
-        statement="The names of constraints whose KKT system gives the optimum of go2's QP, 50 ms "
-        "into a push of 120 N forwards and to the left.",
         stub='guess = ["RR_foot normal force"]  # more names, or others',
         solution="guess = [\n"
         '    "FR_foot facet 2", "FR_foot facet 3", "RL_foot facet 2",\n'
@@ -318,10 +291,3 @@ EXERCISES = (
         "components of its force are fixed. FL, on which go2 leans, is free.",
     ),
 )
-
-
-def _price_of(curvature: Sequence[float]) -> float:
-    """Return the multiplier of C.1 for another bowl, from its equations."""
-    G, H = np.array([0.5, -1.0]), np.diag(curvature)
-    low = np.array([2.0, -2.0])
-    return float(G @ low / (G @ np.linalg.solve(H, G)))

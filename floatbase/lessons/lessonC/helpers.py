@@ -66,10 +66,8 @@ def corner_table(
         The problem.
     """
     H = np.diag(as_array("curvature", curvature, (2,)))
-    G, h = (
-        np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]]),
-        np.array([0.0, 2.0, 2.0, 3.0]),
-    )
+    G = np.array([[0.0, -1.0], [1.0, -3.0], [2.0, 3.0], [-1.0, 0.0]])
+    h = np.array([0.0, 2.0, 2.0, 3.0])
     return fb.QP(
         H,
         -H @ as_array("minimum", minimum, (2,)),
@@ -178,8 +176,7 @@ def run_with_push(
     Rollout
         The record.
     """
-    angle = np.deg2rad(towards)
-    direction = np.array([np.cos(angle), np.sin(angle), 0.0])
+    direction = fb.Push.horizontal(1.0, towards).force
     return lesson07.run_with_push(controller, newtons, duration, direction)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from floatbase.lessons.judges import Verdict, function_or_verdict
+from floatbase.lessons.judges import Verdict, first_fault, function_or_verdict, stopped
 
 _CLOSE = 1e-6  # tolerance of lengths, which are between 0 and 1
 
@@ -94,47 +94,35 @@ def judge_step(answer: Any) -> Verdict:
     """Judge a function that returns the longest step of exercise C.2, on test cases."""
 
     def one(way: _StepCase) -> Verdict | None:
-        for origin in (
-            np.zeros(2),
-            np.array([0.3, -0.2]),
-        ):  # the same step elsewhere: the slack is h - G x
+        for origin in (np.zeros(2), np.array([0.3, -0.2])):
+            # the same step elsewhere: the slack is h - G x
             G = np.array(way.G, dtype=np.float64)
             h = np.array(way.h, dtype=np.float64) + G @ origin
             given = answer(origin, np.array(way.p, dtype=np.float64), G, h, list(way.W))
             if not isinstance(given, tuple) or len(given) != 2:
-                return Verdict(
-                    False,
-                    "Return two things: the length, and the index of the constraint or None.",
-                    "not_two",
-                )
+                text = "Return two things: the length, and the index of the constraint or None."
+                return Verdict(False, text, "not_two")
             length, row = given
             if not isinstance(length, int | float | np.number) or not np.isfinite(length):
                 text = (
                     f"The length is {length!r}, but it must be a number from 0 to 1. Did you "
-                    f"divide by a speed of zero?"
+                    "divide by a speed of zero?"
                 )
                 return Verdict(False, text, "no_length")
-            if length < 0:
-                return Verdict(
-                    False, f"A length is negative ({length:.2g}). {way.text}", "negative"
-                )
-            if row is not None and not isinstance(row, int | np.integer):
-                return Verdict(
-                    False,
-                    f"The constraint is {row!r}, but it must be an index in G or None.",
-                    "no_row",
-                )
             right, blocks = way.answer
-            if abs(length - right) > _CLOSE or row != blocks:
-                if row is not None and row in way.W:
-                    return Verdict(
-                        False, f"Constraint {row} is in W and must not block. {way.text}", "held"
-                    )
-                if np.any(origin):
-                    return Verdict(
-                        False, f"Is the slack h - G x, or h alone? {way.text}", "elsewhere"
-                    )
-                return Verdict(False, way.text, way.hint)
+            wrong = abs(length - right) > _CLOSE or row != blocks
+            fault = first_fault([
+                ("negative", length < 0, f"A length is negative ({length:.2g}). {way.text}"),
+                ("no_row", row is not None and not isinstance(row, int | np.integer),
+                 f"The constraint is {row!r}, but it must be an index in G or None."),
+                ("held", wrong and row is not None and row in way.W,
+                 f"Constraint {row} is in W and must not block. {way.text}"),
+                ("elsewhere", wrong and origin.any(),
+                 f"Is the slack h - G x, or h alone? {way.text}"),
+                (way.hint, wrong, way.text),
+            ])  # fmt: skip
+            if fault:
+                return fault
         return None
 
     return _tried(
@@ -154,9 +142,7 @@ def _tried(answer: Any, cases: Sequence[Callable[[], Verdict | None]], praise: s
             with np.errstate(all="ignore"):
                 said = case()
         except Exception as error:  # whatever a learner's function raises
-            said = Verdict(
-                False, f"Your function stops with {type(error).__name__}: {error}", "stops"
-            )
+            said = stopped(error)
         if said:
             return said
     return Verdict(True, praise)
@@ -177,44 +163,18 @@ class _Drop:
 
 
 _DROP_CASES = (
-    _Drop(
-        "pulls",
-        "One constraint pulls (its multiplier is negative) and must be dropped.",
-        [5, 3, 8],
-        [2.0, -0.5, 1.0],
-        3,
-    ),
-    _Drop(
-        "pushes",
-        "No multiplier is negative here: every constraint pushes, and none must be dropped.",
-        [4, 2],
-        [1.0, 0.5],
-        None,
-    ),
+    _Drop("pulls", "One constraint pulls (its multiplier is negative) and must be dropped.",
+          [5, 3, 8], [2.0, -0.5, 1.0], 3),
+    _Drop("pushes", "No multiplier is negative here: every constraint pushes, and none must be "
+          "dropped.", [4, 2], [1.0, 0.5], None),
     _Drop("empty", "W may be empty. Then there is nothing to drop.", [], [], None),
-    _Drop(
-        "most_negative",
-        "Two constraints pull. Drop the one with the most negative multiplier.",
-        [5, 3, 8],
-        [-0.5, 1.0, -2.0],
-        8,
-    ),
-    _Drop(
-        "negative_alone",
-        "Only a negative multiplier counts, however large another one is.",
-        [1, 6],
-        [9.0, -0.1],
-        6,
-    ),
-    _Drop(
-        "rounding",
-        "-1e-14 is zero except for rounding, so this constraint is not dropped. Use -1e-9 as "
-        "the limit.",
-        [1, 6],
-        [3.0, -1e-14],
-        None,
-    ),
-)
+    _Drop("most_negative", "Two constraints pull. Drop the one with the most negative multiplier.",
+          [5, 3, 8], [-0.5, 1.0, -2.0], 8),
+    _Drop("negative_alone", "Only a negative multiplier counts, however large another one is.",
+          [1, 6], [9.0, -0.1], 6),
+    _Drop("rounding", "-1e-14 is zero except for rounding, so this constraint is not dropped. Use "
+          "-1e-9 as the limit.", [1, 6], [3.0, -1e-14], None),
+)  # fmt: skip
 
 
 def judge_drop(answer: Any) -> Verdict:
@@ -222,19 +182,13 @@ def judge_drop(answer: Any) -> Verdict:
 
     def one(drop: _Drop) -> Verdict | None:
         given = answer(list(drop.W), np.array(drop.prices))
-        if given is not None and not isinstance(given, int | np.integer):
-            return Verdict(
-                False,
-                f"The answer is {given!r}, but it must be an index in G or None.",
-                "no_number",
-            )
-        if given is not None and given not in drop.W:
-            return Verdict(
-                False,
-                "Return the entry of W, which is an index in G, not its position in W.",
-                "place",
-            )
-        return None if given == drop.answer else Verdict(False, drop.text, drop.hint)
+        return first_fault([
+            ("no_number", given is not None and not isinstance(given, int | np.integer),
+             f"The answer is {given!r}, but it must be an index in G or None."),
+            ("place", given is not None and given not in drop.W, "Return the entry of W, which is "
+             "an index in G, not its position in W."),
+            (drop.hint, given != drop.answer, drop.text),
+        ])  # fmt: skip
 
     cases = [partial(one, drop) for drop in _DROP_CASES]
     return _tried(

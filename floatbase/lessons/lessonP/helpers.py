@@ -57,10 +57,7 @@ def time_on_two_feet(shift: npt.ArrayLike) -> float:
     _, level, posture = fb.standing_tasks(state)
     tasks = [fb.CoMTask(state.com + np.asarray(shift)), level, posture]
     fb.rollout(
-        sim,
-        fb.WholeBodyController(robot, contacts, tasks),
-        _LEAN_TIME,
-        control_period=PERIOD,
+        sim, fb.WholeBodyController(robot, contacts, tasks), _LEAN_TIME, control_period=PERIOD
     )
     up = [fb.FrameTask(name, state.point(name) + [0.0, 0.0, _LIFT_HEIGHT]) for name in lifted]
     controller = fb.WholeBodyController(robot, contacts.without(*lifted), [*tasks, *up])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -128,9 +129,14 @@ class InjectedFault:
         size, heading = float(rng.uniform(low, high)), float(rng.uniform(0.0, 2.0 * np.pi))
         if fault == "mass":
             size = 1.0 + size * float(rng.choice([-1.0, 1.0]))
-        names = fb.load("go2").joint_names
+        names = _joint_names()
         first, second = sorted(int(i) for i in rng.choice(len(names), 2, replace=False))
         return InjectedFault(fault, size, heading, (names[first], names[second]))
+
+
+@cache
+def _joint_names() -> Sequence[str]:
+    return fb.load("go2").joint_names
 
 
 def record_box(

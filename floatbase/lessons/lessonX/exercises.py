@@ -13,7 +13,14 @@ import numpy as np
 
 from floatbase._validation import Array
 from floatbase.lessons.exercises import Exercise
-from floatbase.lessons.judges import Example, NumericJudge, ShapeJudge, Verdict, function_or_verdict
+from floatbase.lessons.judges import (
+    Example,
+    Mistake,
+    NumericJudge,
+    ShapeJudge,
+    Verdict,
+    function_or_verdict,
+)
 from floatbase.lessons.lessonX import investigation
 from floatbase.lessons.lessonX.black_box import BlackBox
 from floatbase.lessons.lessonX.cases import (
@@ -76,21 +83,23 @@ def _momentum_change() -> Array:
     )
 
 
-def _kicks() -> dict[str, Callable[[], Any]]:
-    return {
-        "zero": lambda: np.zeros(3),
-        "base_axes": lambda: 0.002 * _residual()[0].sum(axis=0),
-        "no_duration": lambda: _residual()[1].sum(axis=0),
-        "fall": lambda: (
-            0.002
-            * np.sum(
-                [_turned(i, row) for i, row in enumerate(required_forces(kicked_box())[:, :3])],
-                axis=0,
-            )
-        ),
-        "force": lambda: _impulse() / faultless_cases(KICK_SEED)[1].pushes[0].duration,
-        "momentum": _momentum_change,
-    }
+@cache
+def _kicks() -> list[Mistake]:
+    forces = required_forces(kicked_box())[:, :3]
+    (push,) = faultless_cases(KICK_SEED)[1].pushes
+    return [
+        ("zero", np.zeros(3), "There is no answer yet. Take the first three columns of what is "
+         "missing in (7), and sum over time."),
+        ("base_axes", 0.002 * _residual()[0].sum(axis=0), "These are the axes of the base, which "
+         "turn. Convert each row to the world's axes by R before you sum."),
+        ("no_duration", _residual()[1].sum(axis=0), "A sum of forces is not an impulse yet. Each "
+         "row lasts 2 ms."),
+        ("fall", 0.002 * np.sum([_turned(i, row) for i, row in enumerate(forces)], axis=0),
+         "This includes the impacts of the fall. Use only the time of the kick."),
+        ("force", push.force, "That is the force, N. How long did it act?"),
+        ("momentum", _momentum_change(), "That is the change of the robot's momentum. The ground "
+         "contributed to it, too."),
+    ]  # fmt: skip
 
 
 # X.2 ----------------------------------------------------------------------------------------------
@@ -100,19 +109,14 @@ def _judge_report(answer: Any) -> Verdict:
     """Judge a seed and a line for each of its boxes."""
     if answer is None or answer is Ellipsis:
         return Verdict(False, "There is no answer yet. The report is a list of lines.", "no_answer")
-    if (
-        not isinstance(answer, list | tuple)
-        or not answer
-        or not all(isinstance(line, str) for line in answer)
-    ):
-        return Verdict(
-            False, 'The report must be a list of lines of text, such as "A: mass 0.93".', "no_lines"
-        )
+    is_list = isinstance(answer, list | tuple) and len(answer) > 0
+    if not is_list or not all(isinstance(line, str) for line in answer):
+        text = 'The report must be a list of lines of text, such as "A: mass 0.93".'
+        return Verdict(False, text, "no_lines")
     seed = re.fullmatch(r"seed (\d{1,10})", answer[0].strip())
     if not seed or int(seed[1]) > LARGEST_SEED:
-        return Verdict(
-            False, 'The first line must give the seed of the boxes, as in "seed 7".', "no_seed"
-        )
+        text = 'The first line must give the seed of the boxes, as in "seed 7".'
+        return Verdict(False, text, "no_seed")
     lines = {line.strip()[:1].upper(): line.split(":", 1)[1] for line in answer[1:] if ":" in line}
     reports = {name: line for name, line in lines.items() if line.strip(" ?.")}
     return _report_of(int(seed[1]), reports)
@@ -121,18 +125,15 @@ def _judge_report(answer: Any) -> Verdict:
 def _report_of(seed: int, reports: dict[str, str]) -> Verdict:
     """Judge the lines about the boxes of a seed; reports: name of a box -> its line."""
     cases = {case.name: case for case in random_cases(seed)}
-    if unknown := sorted(set(reports) - set(cases)):
-        return Verdict(
-            False,
-            f"There is no box {unknown[0]}. The boxes are A to F, each on its own line.",
-            "no_such_box",
-        )
+    unknown = sorted(set(reports) - set(cases))
+    if unknown:
+        text = f"There is no box {unknown[0]}. The boxes are A to F, each on its own line."
+        return Verdict(False, text, "no_such_box")
     if not reports:
-        return Verdict(
-            False,
-            'There is no line yet. A line names a fault and its evidence, such as "A: mass 0.93".',
-            "nothing_said",
+        text = (
+            'There is no line yet. A line names a fault and its evidence, such as "A: mass 0.93".'
         )
+        return Verdict(False, text, "nothing_said")
     boxes = {box.name: box for box in black_boxes(seed)}
     verdicts = {
         name: judge_line(cases[name], boxes[name], line) for name, line in sorted(reports.items())
@@ -142,13 +143,11 @@ def _report_of(seed: int, reports: dict[str, str]) -> Verdict:
     left = [name for name in cases if name not in verdicts]
     if not wrong and not left:
         return Verdict(True, "Six faults, each with solid evidence. The insurance pays.")
-    parts = [
-        f"Solved: {', '.join(solved)}." if solved else "",
-        *wrong,
-        f"Open: {', '.join(left)}." if left else "",
-    ]
+    parts = [f"Solved: {', '.join(solved)}."] if solved else []
+    parts += wrong
+    parts += [f"Open: {', '.join(left)}."] if left else []
     hint = next((verdict.hint for verdict in verdicts.values() if not verdict.right), "open")
-    return Verdict(False, "\n".join(part for part in parts if part), hint)
+    return Verdict(False, "\n".join(parts), hint)
 
 
 # X.3 ----------------------------------------------------------------------------------------------
@@ -185,39 +184,30 @@ def _judge_program(answer: Any) -> Verdict:
 
 def _tried(program: Callable[[BlackBox], Any], case: Case, box: BlackBox) -> Verdict | None:
     """Return what is wrong with a program's answer about a box, or None."""
-    what = (
-        f"a robot with {case.injected_fault.kind}"
-        if case.injected_fault.kind
-        else "a robot without a fault"
-    )
+    kind = case.injected_fault.kind
+    what = f"a robot with {kind}" if kind else "a robot without a fault"
     what += " that was kicked over" if case.pushes else ""
     try:
         line = program(box)
     except Exception as error:  # whatever a learner's function raises
-        return Verdict(
-            False, f"With {what}, your function stops with {type(error).__name__}: {error}", "stops"
-        )
+        text = f"With {what}, your function stops with {type(error).__name__}: {error}"
+        return Verdict(False, text, "stops")
     if not isinstance(line, str):
-        said = (
+        text = (
             f'Return a line of text, such as "mass 0.93" or "nothing", not {type(line).__name__}.'
         )
-        return Verdict(False, said, "no_text")
+        return Verdict(False, text, "no_text")
     verdict = judge_line(case, box, line)
-    return (
-        None
-        if verdict.right
-        else Verdict(
-            False, f'About {what}, your program says "{line}": {verdict.text}', verdict.hint
-        )
-    )
+    if verdict.right:
+        return None
+    text = f'About {what}, your program says "{line}": {verdict.text}'
+    return Verdict(False, text, verdict.hint)
 
 
 def _reports() -> list[Example]:
     """Return examples with the boxes of seed 1."""
-    boxes, found = (
-        black_boxes(1),
-        {box.name: investigation.investigate(box) for box in black_boxes(1)},
-    )
+    boxes = black_boxes(1)
+    found = {box.name: investigation.investigate(box) for box in boxes}
     cases = {str(case.injected_fault.kind): case for case in random_cases(1)}
     report = ["seed 1", *(f"{name}: {line}" for name, line in found.items())]
 
@@ -246,21 +236,15 @@ def _reports() -> list[Example]:
         made += [
             (but(fault, f"{said} 0.9"), f"not {said}") for said in COUNTER_EVIDENCE if said != fault
         ]
-        made += [
-            (but(fault, line), hint)
-            for hint, line in mistaken(case, boxes["ABCDEF".index(case.name)]).items()
-        ]
-        made += [
-            (
-                but(fault, f"{fault} 987"),
-                "not_two_joints" if fault == "swapped motors" else "evidence",
-            )
-        ]
+        box = boxes["ABCDEF".index(case.name)]
+        made += [(but(fault, line), hint) for hint, line in mistaken(case, box).items()]
+        hint = "not_two_joints" if fault == "swapped motors" else "evidence"
+        made += [(but(fault, f"{fault} 987"), hint)]
     return made
 
 
 def _programs() -> list[Example]:
-    found = investigation.investigate
+    found = cache(investigation.investigate)
     return [
         (found, ""), (lambda box: "nothing", "not nothing"),
         (lambda box: "friction 0.55", "evidence"),
@@ -273,8 +257,6 @@ def _programs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="X.1",
-        statement="The impulse of a kick, shape (3,), N·s, world, from what is missing in (7) "
-        "in the record of a robot without a fault.",
         stub="impulse = np.zeros(3)  # replace: N·s, in the world's axes",
         solution="missed = required_forces(kicked)[:, :3]\n"
         "rows = np.flatnonzero(np.linalg.norm(missed, axis=1) > 50)  # N\n"
@@ -286,18 +268,7 @@ EXERCISES = (
                 right=_impulse,
                 praise="The kick was not recorded, and still you know how hard it was and where "
                 "it came from.",
-                mistakes=_kicks(),
-                hints={
-                    "zero": "There is no answer yet. Take the first three columns of what is "
-                    "missing in (7), and sum over time.",
-                    "base_axes": "These are the axes of the base, which turn. Convert each row "
-                    "to the world's axes by R before you sum.",
-                    "no_duration": "A sum of forces is not an impulse yet. Each row lasts 2 ms.",
-                    "fall": "This includes the impacts of the fall. Use only the time of the kick.",
-                    "force": "That is the force, N. How long did it act?",
-                    "momentum": "That is the change of the robot's momentum. The ground "
-                    "contributed to it, too.",
-                },
+                mistakes=_kicks,
                 tolerance=0.02,
             ),
             {
@@ -312,8 +283,6 @@ EXERCISES = (
     ),
     Exercise(
         name="X.2",
-        statement="The report on your six boxes: the seed, and for each box a fault with its "
-        "evidence.",
         stub="report = [\n"
         '    f"seed {seed}",\n'
         '    "A: ?",  # a fault and its evidence, such as "A: mass 0.93"\n'
@@ -329,8 +298,6 @@ EXERCISES = (
     ),
     Exercise(
         name="X.3",
-        statement="A program that sees only a box and returns its fault with the evidence, or "
-        '"nothing".',
         stub='def investigate(box):\n    return "nothing"  # replace: a fault and its evidence, as '
         "in your report",
         solution=inspect.getsource(investigation),

@@ -129,10 +129,8 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
     """
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
     commanded = box.tau[: len(got)]
-    orders, both = (
-        lagged(commanded, period, ms),
-        np.concatenate([got[:, joint], commanded[:, joint], [0.0]]),
-    )
+    orders = lagged(commanded, period, ms)
+    both = np.concatenate([got[:, joint], commanded[:, joint], [0.0]])
     frame = _PlotFrame(float(times[0]), float(times[-1]), float(both.min()), float(both.max()))
     drawn = frame.ticks()
     drawn += frame.curve(times, got[:, joint], stroke=hex_code(GREYS[2]), stroke_width=6)
@@ -143,9 +141,8 @@ def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> 
         f"thick: required; thin: commanded, {ms:.0f} ms late; median difference of all joints: "
         f"{off:.2f} N·m",
     )
-    text = "".join(
-        f"<div>{line}</div>" for line in words
-    )  # not in the drawing, which shrinks on a narrow page
+    # not in the drawing, which shrinks on a narrow page
+    text = "".join(f"<div>{line}</div>" for line in words)
     return svg.drawing(drawn, WIDTH, f"0 0 {WIDTH} {HEIGHT + 32}") + text
 
 

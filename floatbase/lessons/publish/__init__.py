@@ -12,18 +12,18 @@ from floatbase.lessons.publish.notebooks import (
     with_solutions,
     write_solutions,
 )
-from floatbase.lessons.publish.workspace import MY_FOLDER, NOTEBOOKS, prepare_workspace
+from floatbase.lessons.publish.workspace import (
+    MY_FOLDER,
+    NOTEBOOKS,
+    lesson_notebooks,
+    prepare_workspace,
+)
 
 if TYPE_CHECKING:
     from floatbase.lessons.publish import conventions, equations, grades, pictures, site
 
-_LAZY_MODULES = (
-    "conventions",
-    "equations",
-    "grades",
-    "pictures",
-    "site",
-)  # imported at first use; the last needs the extra `site`
+# imported at first use; the last needs the extra `site`
+_LAZY_MODULES = ("conventions", "equations", "grades", "pictures", "site")
 
 __all__ = [
     "MY_FOLDER",
@@ -35,6 +35,7 @@ __all__ = [
     "grades",
     "lesson_counts",
     "lesson_minutes",
+    "lesson_notebooks",
     "lesson_table",
     "pictures",
     "prepare_workspace",

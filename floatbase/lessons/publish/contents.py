@@ -6,19 +6,19 @@ import re
 from pathlib import Path
 
 from floatbase.lessons.publish.notebooks import read_notebook
-from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
 
 README = NOTEBOOKS.parent / "README.md"
 _BEGIN = "<!-- lessons: made by `python -m floatbase.lessons.publish map` -->\n"
 _END = "<!-- end of lessons -->\n"
 
 
-def lesson_table(folder: Path = NOTEBOOKS) -> str:
+def lesson_table() -> str:
     """Write the table of lessons as Markdown: number, title, equations."""
     lines = ["| | lesson | equations |", "|---|---|---|"]
-    for path in sorted(folder.glob("*.ipynb")):
-        number, title = path.name.split("_")[0], title_of(path).split(" · ")[-1]
-        lines.append(f"| {number} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} |")
+    for lesson, path in lesson_notebooks().items():
+        title = title_of(path).split(" · ")[-1]
+        lines.append(f"| {lesson} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} |")
     return "\n".join(lines).replace("|  |", "| |") + "\n"
 
 

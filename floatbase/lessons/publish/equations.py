@@ -20,7 +20,7 @@ from pathlib import Path
 import floatbase
 from floatbase.lessons.publish.contents import equations_taught, title_of
 from floatbase.lessons.publish.formulas import FORMULAS, NOTES, SECTIONS, Formula
-from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
 
 TITLES = {formula.number: formula.title for formula in FORMULAS}
 _CITATION = re.compile(
@@ -62,7 +62,7 @@ def entries() -> list[Entry]:
 def table() -> str:
     """Write the page as Markdown."""
     found = entries()
-    taught = {path.name: equations_taught(path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
+    taught = {path.name: equations_taught(path) for path in lesson_notebooks().values()}
     lines = [
         "# Equations",
         "",
@@ -138,20 +138,16 @@ def _tests_by_name() -> dict[str, set[str]]:
     """Map each name to the tests that use it, directly or through a helper of the same file."""
     found: dict[str, set[str]] = {}
     for path in sorted(_TESTS.rglob("test_*.py")):
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         functions = {
-            node.name: _identifiers(node)
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            if isinstance(node, ast.FunctionDef)
+            node.name: _identifiers(node) for node in nodes if isinstance(node, ast.FunctionDef)
         }
         for test, names in functions.items():
             if test.startswith("test_"):
-                helpers = set().union(
-                    *(functions[name] for name in names if name in functions), names
-                )
-                for name in sorted(helpers):
-                    found.setdefault(name, set()).add(
-                        f"{path.relative_to(_TESTS).as_posix()}::{test}"
-                    )
+                address = f"{path.relative_to(_TESTS).as_posix()}::{test}"
+                helpers = [functions[name] for name in sorted(names) if name in functions]
+                for name in sorted(names.union(*helpers)):
+                    found.setdefault(name, set()).add(address)
     return found
 
 

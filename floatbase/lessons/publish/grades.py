@@ -26,6 +26,7 @@ from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.predictions import aligned
 from floatbase.lessons.submission import FILE_FORMAT
 
 _LARGEST_FILE = 20_000_000  # bytes; all answers of the course take less than 0.1 MB
@@ -33,9 +34,8 @@ _REQUIRED_KEYS = {"name": str, "exercises": dict, "predictions": dict}
 _INDENT = "    "  # of code, so that no line of it looks like a heading
 _NOT_TRIED, _TO_BE_READ = "·", "to be read"
 _COLUMNS = ("file", "name", "time", "exercise", "result", "tries", "feedback")
-_FORMULA_STARTS = tuple(
-    "=+-@\t\r\n＝＋－＠"
-)  # a spreadsheet may evaluate text that begins with one of these
+# a spreadsheet may evaluate text that begins with one of these
+_FORMULA_STARTS = tuple("=+-@\t\r\n＝＋－＠")
 
 
 @dataclass(frozen=True)
@@ -114,12 +114,10 @@ def _exercise_results(entries: dict[str, Any], student: str) -> Iterator[Exercis
         try:
             with np.errstate(all="ignore"):
                 verdict = exercise.judge_for(student)(progress.from_json(kept))
-        except (
-            Exception
-        ) as error:  # a file may hold anything, and one answer must not end the others' judgement
-            yield ExerciseResult(
-                name, tries, "wrong", f"The answer cannot be judged: {_one_line(error)}"
-            )
+        # a file may hold anything, and one answer must not end the others' judgement
+        except Exception as error:
+            text = f"The answer cannot be judged: {_one_line(error)}"
+            yield ExerciseResult(name, tries, "wrong", text)
         else:
             yield ExerciseResult(name, tries, "right" if verdict.right else "wrong", verdict.text)
 
@@ -180,36 +178,21 @@ def overview(submissions: Sequence[Submission]) -> str:
     rows = [("", *lessons, "all", "to be read", "predictions")]
     for one in submissions:
         rights = [mark.exercise.split(".")[0] for mark in one.results if mark.result == "right"]
-        unread = sum(mark.result == "to be read" for mark in one.results)
+        unread = sum(mark.result == _TO_BE_READ for mark in one.results)
         counts = [rights.count(lesson) for lesson in lessons]
         name = one.name if names.count(one.name) == 1 else f"{one.name} ({one.file})"
-        rows.append(
-            (
-                name,
-                *map(str, counts),
-                f"{len(rights)} of {len(one.results)}",
-                str(unread),
-                str(one.predicted),
-            )
-        )
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(f"{part:<{width}}" for part, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )
+        solved = f"{len(rights)} of {len(one.results)}"
+        rows.append((name, *map(str, counts), solved, str(unread), str(one.predicted)))
+    return aligned(rows, "  ")
 
 
 def code_to_read(submissions: Sequence[Submission]) -> str:
     """Return all code that was handed in, indented."""
-    found = [
-        (one.name, mark)
+    return "\n".join(
+        f"--- {one.name}, {mark.exercise}\n{indent(_printable(mark.feedback), _INDENT)}"
         for one in submissions
         for mark in one.results
-        if mark.result == "to be read"
-    ]
-    return "\n".join(
-        f"--- {name}, {mark.exercise}\n{indent(_printable(mark.feedback), _INDENT)}"
-        for name, mark in found
+        if mark.result == _TO_BE_READ
     )
 
 

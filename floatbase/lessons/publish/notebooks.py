@@ -12,7 +12,7 @@ from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.workspace import (
-    NOTEBOOKS,
+    lesson_notebooks,
     read_record,
     update_copy,
     write_record,
@@ -45,15 +45,32 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
     """Run all cells in a new kernel in `folder`, in place; an error in a cell is raised."""
     from nbclient import NotebookClient
 
-    quiet = [
-        "--IPKernelApp.log_level=40"
-    ]  # its warning that this machine's loopback is not encrypted says nothing here
+    # its warning that this machine's loopback is not encrypted says nothing here
+    quiet = ["--IPKernelApp.log_level=40"]
     where = {"metadata": {"path": str(folder)}}
-    client = NotebookClient(
-        notebook, timeout=120, resources=where, extra_arguments=quiet, coalesce_streams=True
-    )
+    client = NotebookClient(notebook, timeout=120, resources=where, extra_arguments=quiet)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
-        return client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
+        client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            cell.outputs = _merged_streams(cell.outputs)
+    return notebook
+
+
+def _merged_streams(outputs: list[Any]) -> list[Any]:
+    """Merge printed lines in a row, without what went to the error stream.
+
+    A kernel sends lines in parts of any length, and its warnings are not about the lesson.
+    """
+    merged: list[Any] = []
+    for output in outputs:
+        if output.output_type == "stream" and output.name == "stderr":
+            continue
+        if output.output_type == "stream" and merged and merged[-1].output_type == "stream":
+            merged[-1].text += output.text
+        else:
+            merged.append(output)
+    return merged
 
 
 def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[str]:
@@ -64,7 +81,7 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[str]:
     known, messages = all_exercises(), []
     folder.mkdir(parents=True, exist_ok=True)
     record = read_record(folder)
-    for source in sources or sorted(NOTEBOOKS.glob("*.ipynb")):
+    for source in sources or lesson_notebooks().values():
         notebook, cells = with_solutions(read_notebook(source)), []
         for cell in notebook.cells:
             cells.append(cell)
@@ -87,10 +104,7 @@ def run_and_store(path: Path) -> None:
         if cell.cell_type != "code":
             continue
         cell.metadata.pop("execution", None)  # times of day
-        picture = "picture" in cell.metadata.get("tags", [])
-        # what went to the error stream is about this run, not the lesson
-        cell.outputs = (
-            [] if picture else [output for output in cell.outputs if output.get("name") != "stderr"]
-        )
+        if "picture" in cell.metadata.get("tags", []):
+            cell.outputs = []
     notebook.metadata.pop("widgets", None)
     write_whole(path, f"{nbformat.writes(notebook)}\n".encode())

@@ -18,7 +18,11 @@ from floatbase.errors import InputError
 from floatbase.lessons import assignment
 from floatbase.lessons.predictions import lesson_name
 from floatbase.lessons.publish.contents import title_of
-from floatbase.lessons.publish.workspace import NOTEBOOKS, write_without_outputs
+from floatbase.lessons.publish.workspace import (
+    NOTEBOOKS,
+    lesson_notebooks,
+    write_without_outputs,
+)
 
 _ROOT = NOTEBOOKS.parent
 _INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")
@@ -47,7 +51,7 @@ _Change: TypeAlias = tuple[ast.stmt | ast.expr, str]  # part of a module, and wh
 
 def lesson_paths(lessons: Sequence[str]) -> dict[str, Path]:
     """Return the notebook of each lesson, by its name."""
-    known = {path.name.split("_")[0]: path for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
+    known = lesson_notebooks()
     names = [lesson_name(name) for name in lessons]
     if unknown := [name for name in names if name not in known]:
         raise InputError(f"There is no lesson {unknown[0]!r}. The lessons are {', '.join(known)}.")
@@ -74,8 +78,7 @@ def write_assignment(
     with_solutions: bool = False,
 ) -> None:
     """Write a package for students with some lessons, and without solutions."""
-    paths = lesson_paths(lessons)
-    paths = lesson_paths([_FIRST_LESSON]) | paths
+    paths = lesson_paths([_FIRST_LESSON]) | lesson_paths(lessons)
     copy_package(folder)
     shutil.copy(_ROOT / "Makefile", folder)
     shutil.copy(_ROOT / ".gitignore", folder)

@@ -14,6 +14,7 @@ import html
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from floatbase.viewer.web import pages
 _MIN_SHARED_SIZE = 1500  # bytes of a command that pictures share; a smaller one each has itself
 _COMMON_FRACTION = 0.3  # of a robot's pictures
 _FOLDER = "pictures"  # beside pictures.js
+_DATA_KEYS = ("keys", "first", "stops", "notes", "together")  # the HTML has all else
 _NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 
@@ -59,35 +61,23 @@ class Pictures:
         for name, (description, commands) in self._placed.items():
             shared = sorted({at[command] for command in commands if command in at})
             own = [command for command in commands if command not in at]
-            numbers = {
-                c: i for i, c in enumerate([*(c for group in shared for c in groups[group]), *own])
-            }
-            kept = {
-                name: description[name] for name in ("keys", "first", "stops", "notes", "together")
-            }
-            head = {**kept, "shared": shared, "at": [numbers[command] for command in commands]}
+            loaded = [*chain.from_iterable(groups[group] for group in shared), *own]
+            numbers = {command: i for i, command in enumerate(loaded)}
+            head = {key: description[key] for key in _DATA_KEYS}
+            head |= {"shared": shared, "at": [numbers[command] for command in commands]}
             self._write(name, [json.dumps(head, separators=(",", ":")).encode(), *own])
 
     def _shared_files(self) -> dict[str, list[bytes]]:
         """Collect large commands that several pictures use: name of a file -> commands."""
-        pictures = [
-            (set(description["names"]), set(commands))
-            for description, commands in self._placed.values()
-        ]
-        uses = Counter(
-            command
-            for _, commands in pictures
-            for command in commands
-            if len(command) >= _MIN_SHARED_SIZE
-        )
-        robots = {
-            c: set.union(*(names for names, has in pictures if c in has))
-            for c, times in uses.items()
-            if times > 1
-        }
+        placed = self._placed.values()
+        pictures = [(set(about["names"]), set(commands)) for about, commands in placed]
+        uses = Counter(chain.from_iterable(commands for _, commands in pictures))
         found: dict[str, list[bytes]] = {}
-        for command in sorted(robots):
-            (robot,) = robots[command] if len(robots[command]) == 1 else ("robots",)
+        for command in sorted(uses):
+            if len(command) < _MIN_SHARED_SIZE or uses[command] == 1:
+                continue
+            robots = set[str]().union(*(names for names, has in pictures if command in has))
+            (robot,) = robots if len(robots) == 1 else ("robots",)
             usual = uses[command] >= _COMMON_FRACTION * sum(robot in names for names, _ in pictures)
             found.setdefault(robot if usual else f"{robot}-more", []).append(command)
         return {_file_name(name, *commands): commands for name, commands in found.items()}
@@ -105,33 +95,19 @@ def _file_name(begin: str, *parts: bytes) -> str:
 
 def _figure_html(name: str, description: dict[str, Any]) -> str:
     """Write the figure before its script loads: first images, note, and disabled controls."""
-    scenes = "".join(
-        f'<div class="floatbase-scene" '
-        f'style="--height:{height}px">{f"<b>{html.escape(title)}</b>" if title else ""}'
-        f'<div><img alt="3-D picture of {html.escape(robot)}" '
-        f'src="data:image/png;base64,{image}"></div></div>'
-        for height, robot, image, title in zip(
-            description["heights"],
-            description["names"],
-            description["stills"],
-            description["titles"] or [""] * len(description["names"]),
-            strict=True,
-        )
-    )
-    first = ",".join(str(control["first"]) for control in description["controls"])
-    note = (
-        description["notes"][description["stops"][first][0]]
-        if first in description["stops"]
-        else ""
-    )
+    heights, names, stills = (description[key] for key in ("heights", "names", "stills"))
+    titles = description["titles"] or [""] * len(names)
+    scenes = "".join(map(_scene_html, heights, names, stills, titles))
     if scenes:
         scenes = f'<div class="floatbase-scenes">{scenes}</div>'
+    first = ",".join(str(control["first"]) for control in description["controls"])
+    note = ""
+    if first in description["stops"]:
+        note = description["notes"][description["stops"][first][0]]
     controls = "".join(map(_control_html, description["controls"]))
-    words = (
-        f'<p class="floatbase-words">{html.escape(description["words"])}</p>'
-        if description["words"]
-        else ""
-    )
+    words = html.escape(description["words"])
+    if words:
+        words = f'<p class="floatbase-words">{words}</p>'
     return (
         f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
         f'data-picture="{name}">'
@@ -139,6 +115,15 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
         f'<div class="floatbase-controls">{controls}</div>{words}'
         f"<noscript><p>{_NO_SCRIPT_TEXT}</p></noscript></figure>"
+    )
+
+
+def _scene_html(height: int, robot: str, image: str, title: str) -> str:
+    heading = f"<b>{html.escape(title)}</b>" if title else ""
+    return (
+        f'<div class="floatbase-scene" style="--height:{height}px">{heading}'
+        f'<div><img alt="3-D picture of {html.escape(robot)}" '
+        f'src="data:image/png;base64,{image}"></div></div>'
     )
 
 

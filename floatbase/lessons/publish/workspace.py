@@ -18,17 +18,18 @@ from floatbase.errors import InputError
 NOTEBOOKS = Path(__file__).parents[3] / "notebooks"  # of the course
 MY_FOLDER = "my"
 _RECORD_FILE = ".from.json"  # file name -> digest of the text that the learner received last
-_NOT_A_NOTEBOOK = (
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-)  # exceptions that such JSON raises
+# exceptions that such JSON raises
+_NOT_A_NOTEBOOK = (ValueError, LookupError, TypeError, AttributeError)
 # what JupyterLab writes when a notebook is only run and viewed; all else is the learner's work
 _RUN_KEYS = {"kernelspec", "language_info", "orig_nbformat", "signature", "widgets"}
 _RUN_CELL_KEYS = {
     "collapsed", "execution", "jp-MarkdownHeadingCollapsed", "jupyter", "scrolled", "trusted",
 }  # fmt: skip
+
+
+def lesson_notebooks() -> dict[str, Path]:
+    """Return the notebook of each lesson, by the name of the lesson, such as "02" or "C"."""
+    return {path.name.split("_")[0]: path for path in sorted(NOTEBOOKS.glob("*.ipynb"))}
 
 
 def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> list[str]:
@@ -47,7 +48,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
             f"to."
         ) from None
     record, messages = read_record(mine), []
-    for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md"))]:
+    one_file = folder.parent.glob("examples/wbc.py")  # the end of lesson 07 names it
+    for source in [*sorted(folder.glob("*.ipynb")), *sorted(folder.glob("*.md")), *one_file]:
         try:
             messages += update_copy(mine / source.name, _course_text(source), record)
         except OSError as error:

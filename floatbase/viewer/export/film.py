@@ -23,28 +23,17 @@ from floatbase.viewer.scene.colours import LEGEND
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-FRAME_RATES = {
-    ".png": 0,
-    ".mp4": 30,
-    ".gif": 20,
-}  # pictures per second of each file type; 0: only the first one
+# pictures per second of each file type; 0: only the first one
+FRAME_RATES = {".png": 0, ".mp4": 30, ".gif": 20}
 _MAX_DURATION = 120.0  # s
 _MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
 _BROWSERS = (
-    "chromium",
-    "chromium-browser",
-    "google-chrome",
-    "google-chrome-stable",
-    "chrome",
-    "msedge",
-)
+    "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge",
+)  # fmt: skip
 _FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
+    "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--disable-quic",
-]
+]  # fmt: skip
 _TIMEOUT_MS = 60_000  # ms until the page must have drawn
 _REQUIREMENTS = (
     "Films and images need a browser (Chromium or Chrome) and two packages: pip install "

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import umsgpack
 
 from floatbase._validation import (
     Array,
@@ -24,6 +23,7 @@ from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.shapes import Item, Picture, with_normal_paths
+from floatbase.viewer.scene.threejs import packed_array
 
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
@@ -80,24 +80,18 @@ def animate(
     for path, history in histories.items():
         tracks = list(_tracks(history, t))
         if tracks:
-            clips.append(
-                {"path": root + path, "clip": {"fps": 1, "name": "default", "tracks": tracks}}
-            )
+            clip = {"fps": 1, "name": "default", "tracks": tracks}
+            clips.append({"path": root + path, "clip": clip})
     options = {"play": True, "repetitions": REPETITIONS, "speed": speed, "paused": paused}
-    command = protocol.encode(
-        {"type": "set_animation", "path": "", "animations": clips, "options": options}
-    )
-    return Animation(
-        {path: history.item for path, history in histories.items()}, command, float(t[-1])
-    )
+    command = protocol.page_command("set_animation", animations=clips, options=options)
+    first = {path: history.item for path, history in histories.items()}
+    return Animation(first, command, float(t[-1]))
 
 
 def sampled_rows(times: npt.ArrayLike, rate: float) -> npt.NDArray[np.int64]:
     """Choose the rows of a rollout to draw: the first, the last, and `rate` per second between."""
-    t, rate = (
-        as_array("times", times, (None,), "s"),
-        as_positive("rate", rate, "1/s", maximum=_MAX_RATE),
-    )
+    t = as_array("times", times, (None,), "s")
+    rate = as_positive("rate", rate, "1/s", maximum=_MAX_RATE)
     if not t.size:
         raise InputError(
             "times is empty, so there is nothing to draw; it must have at least one entry."
@@ -146,9 +140,8 @@ def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.b
     as_instance("contacts", contacts, Contacts)
     drawn = np.array([isinstance(c, FrictionContact) for c in contacts], dtype=bool)
     names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
-    return contacts.only(*names), np.repeat(
-        drawn, np.array([contact.k for contact in contacts], dtype=int)
-    )
+    sizes = np.array([contact.k for contact in contacts], dtype=int)
+    return contacts.only(*names), np.repeat(drawn, sizes)
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
@@ -199,12 +192,8 @@ def _tracks(history: _ItemHistory, t: Array) -> Iterator[dict[str, Any]]:
     yield from _track("quaternion", "quaternion", t, quaternions)
     yield from _track("scale", "vector3", t, scales)
     if not history.present.all():
-        yield {
-            "name": ".visible",
-            "type": "bool",
-            "times": t.tolist(),
-            "values": history.present.tolist(),
-        }
+        shown = {"times": t.tolist(), "values": history.present.tolist()}
+        yield {"name": ".visible", "type": "bool", **shown}
     if history.colours is not None:
         yield from _track("shape.material.color", "color", t, history.colours[:, :3], _DISCRETE)
         yield from _track("shape.material.opacity", "number", t, history.colours[:, 3:], _DISCRETE)
@@ -219,15 +208,10 @@ def _track(
     yield {
         "name": name if "." in name else f".{name}",
         "type": kind,
-        "times": _packed_floats(t),
-        "values": _packed_floats(values),
+        "times": packed_array("Float32Array", t),
+        "values": packed_array("Float32Array", values),
         "interpolation": interpolation,
     }
-
-
-def _packed_floats(values: Array) -> umsgpack.Ext:
-    """Pack numbers as single-precision floats."""
-    return umsgpack.Ext(0x17, np.ascontiguousarray(values, dtype="<f4").tobytes())
 
 
 def _quaternions(rotations: Array) -> Array:

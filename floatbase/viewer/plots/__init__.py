@@ -9,8 +9,6 @@ from floatbase.viewer.plots.run_plots import (
     plot_com,
     plot_forces,
     plot_friction,
-    plot_gait,
-    plot_normal_forces,
     plot_run,
     plot_torques,
 )
@@ -20,8 +18,6 @@ __all__ = [
     "plot_com",
     "plot_forces",
     "plot_friction",
-    "plot_gait",
-    "plot_normal_forces",
     "plot_run",
     "plot_torques",
     "push_recovery_plots",

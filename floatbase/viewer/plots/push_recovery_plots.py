@@ -23,9 +23,8 @@ _FILL = 0.15  # opacity of the area inside the measured curve
 _HEIGHT_ABOVE_GROUND = 0.004  # m above the ground: no flicker with its lines, no visible gap
 _RING_SIDES = 72  # number of sides of a ring
 
-_Curve: TypeAlias = tuple[
-    str, Array, RGB, str
-]  # kind as in `LEGEND`, values (n,) in N, colour, style of its line
+# kind as in `LEGEND`, values (n,) in N, colour, style of its line
+_Curve: TypeAlias = tuple[str, Array, RGB, str]
 
 
 def plot(
@@ -88,14 +87,9 @@ def picture(
     Picture
         Items for `extra` of `Viewer.show`.
     """
+    curves, feet = _curves(result, theory, previous), result.contacts.positions(result.state)
     middle = result.state.frame_pose(result.frame).translation
-    return _picture(
-        result.directions,
-        _curves(result, theory, previous),
-        middle,
-        result.contacts.positions(result.state),
-        scale,
-    )
+    return _picture(result.directions, curves, middle, feet, scale)
 
 
 def plot_horizontal_force_limits(
@@ -126,42 +120,8 @@ def plot_horizontal_force_limits(
     InfeasibleError
         If the stance cannot carry the weight.
     """
-    return _plot(
-        *_horizontal_force_curve(wrenches, n),
-        "maximum horizontal force at full weight without moment [N]",
-        axis,
-    )
-
-
-def horizontal_force_limits(
-    wrenches: WrenchSet, scale: float | None = None, n: int = 72
-) -> Picture:
-    """Draw `plot_horizontal_force_limits` on level ground below the centre of mass, with rings.
-
-    Parameters
-    ----------
-    wrenches : WrenchSet
-        Wrenches of the stance, as from `floatbase.friction.wrench_set`.
-    scale : float, optional
-        Length of a drawn force [m/N]. By default, the curve is 1.5 times as wide as the stance.
-    n : int, optional
-        Number of directions.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-
-    Raises
-    ------
-    InputError
-        If a force is unbounded.
-    InfeasibleError
-        If the stance cannot carry the weight.
-    """
-    return _picture(
-        *_horizontal_force_curve(wrenches, n), wrenches.reference_point, wrenches.points, scale
-    )
+    title = "maximum horizontal force at full weight without moment [N]"
+    return _plot(*_horizontal_force_curve(wrenches, n), title, axis)
 
 
 def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None) -> Axes:
@@ -174,15 +134,8 @@ def _plot(directions: Array, curves: list[_Curve], title: str, axis: Axes | None
         )
     axis.set_theta_zero_location("N")
     for kind, values, colour, style in curves:
-        axis.plot(
-            _closed(directions),
-            _closed(values),
-            style,
-            color=colour,
-            linewidth=2,
-            markersize=4,
-            label=_legend_text(kind),
-        )
+        angles, forces, label = _closed(directions), _closed(values), _legend_text(kind)
+        axis.plot(angles, forces, style, color=colour, linewidth=2, markersize=4, label=label)
     _, first, colour, _ = curves[0]
     axis.fill(directions, first, color=colour, alpha=_FILL)
     axis.set_rlim(0.0, 1.1 * max(values.max() for _, values, _, _ in curves))
@@ -206,24 +159,18 @@ def _picture(
     items: Picture = {}
     for height, (kind, values, colour, _) in enumerate(reversed(curves)):
         tips = scale * values[:, None] * _unit_vectors(directions)
-        items[f"{kind}/line"] = _loop(
-            centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2], tips, 0.015 * span, colour
-        )
+        above = centre + [0.0, 0.0, height * _HEIGHT_ABOVE_GROUND / 2]
+        items[f"{kind}/line"] = _loop(above, tips, 0.015 * span, colour)
     # a fan from the middle, as the area is not convex; kind, tips and colour are those of the first
     # curve
-    inside = threejs.mesh(
-        *geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]])),
-        colour,
-        opacity=_FILL,
-        lit=False,
-    )
+    fan = geometry.convex_polygon(np.vstack([np.zeros(3), tips, tips[:1]]))
+    inside = threejs.mesh(*fan, colour, opacity=_FILL, lit=False)
     items[f"{kind}/inside"] = Item(inside, transform(centre))
     circle = _unit_vectors(2.0 * np.pi * np.arange(_RING_SIDES) / _RING_SIDES)
     step = geometry.round_1_2_5(largest / 3)
     for force in step * np.arange(1, int(largest / step) + 1):
-        items[f"{kind}/ring {force:g} N"] = _loop(
-            centre, scale * force * circle, 0.006 * span, LIMIT
-        )
+        ring = _loop(centre, scale * force * circle, 0.006 * span, LIMIT)
+        items[f"{kind}/ring {force:g} N"] = ring
         at = centre + scale * force * _unit_vectors(-np.pi / 8)
         items[f"{kind}/label {force:g} N"] = label(at, f"{force:g} N", 0.09 * span)
     return items
@@ -281,9 +228,6 @@ def _loop(centre: Array, corners: Array, radius: float, colour: RGB) -> Item:
         for a, b in zip(corners, ends, strict=True)
         if not np.array_equal(a, b)
     ]
-    joints = [
-        (vertices + corner, faces)
-        for corner in corners
-        for vertices, faces in [geometry.sphere(radius, 8)]
-    ]
+    vertices, faces = geometry.sphere(radius, 8)
+    joints = [(vertices + corner, faces) for corner in corners]
     return Item(threejs.mesh(*geometry.merged(rods + joints), colour, lit=False), transform(centre))

@@ -1,19 +1,15 @@
-"""Plots of a rollout: centre of mass, forces, gait, friction, torques."""
+"""Plots of a rollout: centre of mass, forces, friction, torques."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from floatbase._validation import Array, as_instance, numeric_copy, short_repr
-from floatbase.dynamics import FrictionContact
 from floatbase.errors import InputError
 from floatbase.viewer.export.recording import as_rollout
 from floatbase.viewer.scene.colours import (
@@ -31,16 +27,8 @@ from floatbase.viewer.scene.colours import (
 if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
-MIN_LOAD = (
-    0.01  # fraction of the weight: the direction of a smaller force says nothing about friction
-)
-_INSIDE: dict[str, Any] = {"loc": "upper right"}  # position of the legend
-_ABOVE: dict[str, Any] = {
-    "loc": "lower right",
-    "bbox_to_anchor": (1.0, 1.0),
-    "ncols": 3,
-    "frameon": False,
-}
+# fraction of the weight: the direction of a smaller force says nothing about friction
+_MIN_LOAD = 0.01
 
 
 def plot_run(rollout: Rollout) -> Figure:
@@ -58,10 +46,9 @@ def plot_run(rollout: Rollout) -> Figure:
     """
     as_rollout(rollout)
     figure, axes = plt.subplots(4, 1, figsize=(8, 11), sharex=True, layout="constrained")
-    for plotted, axis in zip(
-        (plot_com, plot_forces, plot_friction, plot_torques), axes, strict=True
-    ):
-        plotted(rollout, axis)
+    plots = (plot_com, plot_forces, plot_friction, plot_torques)
+    for plot, axis in zip(plots, axes, strict=True):
+        plot(rollout, axis)
     axes[0].set_title(f"{rollout.robot.name}: {rollout.outcome}")
     for axis in axes[:-1]:
         axis.set_xlabel("")
@@ -110,132 +97,10 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
-    for i, (planned, measured) in enumerate(
-        zip(_normal(rollout, rollout.planned), _normal(rollout, rollout.measured), strict=True)
-    ):
-        axis.plot(
-            rollout.time,
-            planned,
-            color=PLANNED,
-            linewidth=3.5,
-            alpha=0.6,
-            label="" if i else "planned",
-        )
-        axis.plot(
-            rollout.time, measured, color=MEASURED, linewidth=1.2, label="" if i else "measured"
-        )
+    planned, measured = _normal(rollout, rollout.planned), _normal(rollout, rollout.measured)
+    for i in range(len(planned)):
+        _plot_both(axis, rollout.time, planned[i], measured[i], 1.2, has_labels=i == 0)
     return _finished(axis, rollout, "normal forces [N]")
-
-
-def plot_gait(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Plot the gait diagram.
-
-    Each foot has a bar while it is in the controller's stance, and a line while the ground carries
-    it.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        Record to plot.
-    axis : Axes, optional
-        Axes to plot on. By default, a new figure.
-
-    Returns
-    -------
-    Axes
-        The axes.
-
-    Raises
-    ------
-    InputError
-        If the record has no contacts.
-    """
-    names = _contact_names(rollout)
-    axis = _axes_or_new(axis)
-    rows = enumerate(
-        zip(_stance_rows(rollout), _normal_of_contacts(rollout, rollout.measured), strict=True)
-    )
-    for i, (stands, measured) in rows:
-        carried = np.where(measured > MIN_LOAD * rollout.robot.weight, float(i), np.nan)
-        bars = axis.broken_barh(
-            _intervals(rollout.time, stands),
-            (i - 0.36, 0.72),
-            color=GREYS[2],
-            alpha=0.6,
-            linewidth=0.0,
-        )
-        bars.set_label("" if i else "in the controller's stance")
-        axis.plot(
-            rollout.time,
-            carried,
-            color=MEASURED,
-            linewidth=2.5,
-            label="" if i else "measured contact",
-        )
-    axis.set_yticks(range(len(names)), names)
-    axis.set_ylim(len(names) - 0.5, -0.5)
-    return _finished(axis, rollout, "", _ABOVE)
-
-
-def plot_normal_forces(rollout: Rollout, axes: Sequence[Axes] | None = None) -> list[Axes]:
-    """Plot the normal force of each contact over time in its own axes [N].
-
-    The measured force is drawn over a wider line for the planned one.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        Record to plot.
-    axes : sequence of Axes, optional
-        One for each contact of the record. By default, a new figure.
-
-    Returns
-    -------
-    list of Axes
-        The axes.
-
-    Raises
-    ------
-    InputError
-        If the record has no contacts, or if the number of axes differs from that of contacts.
-    """
-    names = _contact_names(rollout)
-    if axes is None:
-        size = (8, 1.0 + 1.1 * len(names))
-        grid = plt.subplots(
-            len(names),
-            1,
-            figsize=size,
-            sharex=True,
-            sharey=True,
-            layout="constrained",
-            squeeze=False,
-        )[1]
-        axes = list(grid[:, 0])
-    if isinstance(axes, np.ndarray):  # as of plt.subplots
-        axes = list(axes.flat)
-    made = [
-        as_instance("one of axes", axis, Axes, "plt.gca()")
-        for axis in (axes if isinstance(axes, list | tuple) else [axes])
-    ]
-    if len(made) != len(names):
-        raise InputError(
-            f"axes has {len(made)} entries; it must have one for each of the {len(names)} "
-            f"contacts: {', '.join(names)}."
-        )
-    planned, measured = (
-        _normal_of_contacts(rollout, forces) for forces in (rollout.planned, rollout.measured)
-    )
-    for i, (axis, name) in enumerate(zip(made, names, strict=True)):
-        axis.plot(
-            rollout.time, planned[i], color=PLANNED, linewidth=3.5, alpha=0.6, label="planned"
-        )
-        axis.plot(rollout.time, measured[i], color=MEASURED, linewidth=1.0, label="measured")
-        axis.axhline(0.0, color=LIMIT, linewidth=0.6)
-        _finished(axis, rollout, "", {} if i else _ABOVE)
-        axis.set_ylabel(f"{name}\n[N]", rotation=0, ha="right", va="center")
-        axis.set_xlabel("time [s]" if i + 1 == len(made) else "")
-    return made
 
 
 def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
@@ -267,14 +132,8 @@ def plot_friction(rollout: Rollout, axis: Axes | None = None) -> Axes:
         (rollout.measured, MEASURED, "measured", 1.2),
     ):
         for i, share in enumerate(friction_used(rollout, forces)):
-            axis.plot(
-                rollout.time,
-                share,
-                color=colour,
-                linewidth=width,
-                alpha=0.7,
-                label="" if i else name,
-            )
+            label = "" if i else name
+            axis.plot(rollout.time, share, color=colour, linewidth=width, alpha=0.7, label=label)
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
     return _finished(axis, rollout, "friction / (μ · normal force)")
 
@@ -300,9 +159,8 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
     share = rollout.tau[:, limited] / rollout.robot.torque_limits[limited]
     axis.plot(rollout.time, share, color=GREYS[0], linewidth=0.8, alpha=0.7)
     for limit in (-1.0, 1.0):
-        axis.axhline(
-            limit, color=LIMIT, linestyle="--", linewidth=1.0, label="limit" if limit > 0 else ""
-        )
+        label = "limit" if limit > 0 else ""
+        axis.axhline(limit, color=LIMIT, linestyle="--", linewidth=1.0, label=label)
     return _finished(axis, rollout, "torque / limit")
 
 
@@ -338,7 +196,7 @@ def friction_used(rollout: Rollout, forces: Array) -> Array:
     normals, mus = rollout.contacts.normals, rollout.contacts.mus
     push = np.einsum("nij,ij->ni", f, normals)
     slide = np.linalg.norm(f - push[:, :, None] * normals, axis=2)
-    carried = push > MIN_LOAD * rollout.robot.weight
+    carried = push > _MIN_LOAD * rollout.robot.weight
     share = np.full_like(push, np.nan)
     np.divide(slide, mus * push, out=share, where=carried)
     return np.asarray(share.T)
@@ -350,70 +208,29 @@ def _normal(rollout: Rollout, forces: Array) -> Array:
     return np.asarray(np.einsum("nij,ij->in", f, rollout.contacts.normals))
 
 
-def _contact_names(rollout: Rollout) -> tuple[str, ...]:
-    """Return the names of the record's contacts; raise `InputError` if there are none."""
-    names = as_rollout(rollout).contacts.names
-    if not names:
-        raise InputError("The record has no contacts, so there is nothing to plot.")
-    return names
-
-
-def _normal_of_contacts(rollout: Rollout, forces: Array) -> Array:
-    """Return the normal force of each contact and time, shape (contacts, n) [N]."""
-    points, starts = (
-        _normal(rollout, forces),
-        np.cumsum(
-            [0]
-            + [
-                len(contact.point_names) if isinstance(contact, FrictionContact) else 0
-                for contact in rollout.contacts
-            ]
-        ),
-    )
-    return np.array([points[a:b].sum(axis=0) for a, b in pairwise(starts)])
-
-
-def _stance_rows(rollout: Rollout) -> npt.NDArray[np.bool_]:
-    """Return whether the controller's stance had each contact at each time, shape (contacts, n)."""
-    if not rollout.stances:
-        return np.ones((len(rollout.contacts), len(rollout)), dtype=bool)
-    has = {
-        stance: [name in stance.names for name in rollout.contacts.names]
-        for stance in dict.fromkeys(rollout.stances)
-    }
-    return np.array([has[stance] for stance in rollout.stances], dtype=bool).T
-
-
-def _intervals(times: Array, there: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """Return the start and length [s] of each interval in which a condition holds."""
-    changes = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
-    ends = np.append(times, times[-1:])
-    return [(float(times[a]), float(ends[b] - times[a])) for a, b in changes.reshape(-1, 2)]
-
-
 def _axes_or_new(axis: Axes | None) -> Axes:
     """Return the given axes, or those of a new figure."""
-    return (
-        plt.subplots(figsize=(8, 3), layout="constrained")[1]
-        if axis is None
-        else as_instance("axis", axis, Axes, "plt.gca()")
-    )
+    if axis is None:
+        return plt.subplots(figsize=(8, 3), layout="constrained")[1]
+    return as_instance("axis", axis, Axes, "plt.gca()")
 
 
-def _finished(
-    axis: Axes, rollout: Rollout, label: str, legend: Mapping[str, Any] = _INSIDE
-) -> Axes:
-    """Add labels, a band for each push, and a legend unless `legend` is empty."""
+def _plot_both(
+    axis: Axes, time: Array, planned: Array, measured: Array, width: float, has_labels: bool = True
+) -> None:
+    """Plot measured values over a wider line for the planned ones."""
+    labels = ("planned", "measured") if has_labels else ("", "")
+    axis.plot(time, planned, color=PLANNED, linewidth=3.5, alpha=0.6, label=labels[0])
+    axis.plot(time, measured, color=MEASURED, linewidth=width, label=labels[1])
+
+
+def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
+    """Add labels, a legend, and a band for each push."""
     for i, push in enumerate(rollout.pushes):
-        axis.axvspan(
-            push.start,
-            push.start + push.duration,
-            color=PUSH,
-            alpha=0.12,
-            label="" if i else "push",
-        )
+        end, label_of_push = push.start + push.duration, "" if i else "push"
+        axis.axvspan(push.start, end, color=PUSH, alpha=0.12, label=label_of_push)
     axis.set(xlabel="time [s]", ylabel=label)
     axis.grid(alpha=0.25)
-    if legend and axis.get_legend_handles_labels()[0]:
-        axis.legend(fontsize="small", **legend)
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(fontsize="small", loc="upper right")
     return axis

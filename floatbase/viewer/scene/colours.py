@@ -28,18 +28,14 @@ WARNING = _rgb("#E69F00")
 ALARM = _rgb("#D55E00")
 IDLE = _rgb("#8A8F98")
 SUPPORT = CALM
-PUSH = _rgb(
-    "#222222"
-)  # also the ZMP and multipliers; on a dark background they are light, like text
+# of a push, the ZMP and multipliers; on a dark background they are light, like text
+PUSH = _rgb("#222222")
 LIMIT = _rgb("#888888")
 ROBOT = _rgb("#9EA3AB")
 GHOST = _rgb("#7A86A8")
 PATCH = _rgb("#444444")
-GREYS = (
-    _rgb("#2B3440"),
-    _rgb("#6F7885"),
-    _rgb("#959EAA"),
-)  # dark, middle, light; the middle one is visible on any background
+# dark, middle, light; the middle one is visible on any background
+GREYS = (_rgb("#2B3440"), _rgb("#6F7885"), _rgb("#959EAA"))
 
 X_AXIS = _rgb("#D55E00")
 Y_AXIS = _rgb("#009E73")

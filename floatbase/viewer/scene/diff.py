@@ -29,9 +29,8 @@ class DiffRenderer:
         updates += [protocol.delete(ROOT + path) for path in removed_paths]
         deleted = tuple(f"{path}/" for path in removed_paths)
         for path, item in picture.items():
-            updates += _changes(
-                ROOT + path, None if f"{path}/".startswith(deleted) else old.get(path), item
-            )
+            before = None if f"{path}/".startswith(deleted) else old.get(path)
+            updates += _changes(ROOT + path, before, item)
         new_settings = self._unsent(settings)
         updates += new_settings
         if updates:

@@ -25,10 +25,8 @@ COLOUR = GREYS[1]  # of all marks except the centre of mass; it is visible on an
 # fraction of the robot's size, above the ground: avoids flicker with its lines and the support
 # polygon
 _HEIGHT_ABOVE_GROUND = 0.005
-_RING_RADIUS, _DIAMOND_SIZE = (
-    0.07,
-    0.05,
-)  # radius of the capture point's mark, half the height of the ZMP's: fractions of the robot's size
+# radius of the capture point's mark, half the height of the ZMP's: fractions of the robot's size
+_RING_RADIUS, _DIAMOND_SIZE = 0.07, 0.05
 _OUTLINE_WIDTH = 0.012  # of a foothold's outline, as a fraction of the robot's size
 _MIN_LENGTH = 1e-6  # m: avoids a singular matrix for a path of zero length
 _SEGMENTS = 24  # of a swing path
@@ -84,10 +82,8 @@ def as_steps(steps: Iterable[StepPlan]) -> list[StepPlan]:
 
 def _capture_point_and_zmp(plan: CoMPlan, t: float, state: State, style: Style) -> Picture:
     """Draw the capture point and the planned zero-moment point at time t [s]."""
-    dcm, zmp = (
-        capture_point(as_instance("state", state, State).com, state.com_velocity, plan.omega),
-        plan.zmp(t),
-    )
+    as_instance("state", state, State)
+    dcm, zmp = capture_point(state.com, state.com_velocity, plan.omega), plan.zmp(t)
     lift = _HEIGHT_ABOVE_GROUND * style.size
     ring = transform([*dcm, style.ground.height(dcm) + lift], scale=_RING_RADIUS * style.size)
     diamond = transform([*zmp, style.ground.height(zmp) + lift], scale=_DIAMOND_SIZE * style.size)
@@ -107,10 +103,8 @@ def _footholds_and_swings(
     yaw = float(np.arctan2(forward_y, forward_x))
     for name, place in footholds.items():
         foot, path = _foot(state.robot, name), name.replace("/", "_")
-        rotation, offset = (
-            rotation_z(yaw + yaw_changes.get(name, 0.0)),
-            _offset_to_ground(foot, state.robot.standing()),
-        )
+        rotation = rotation_z(yaw + yaw_changes.get(name, 0.0))
+        offset = _offset_to_ground(foot, state.robot.standing())
         picture[f"foothold/{path}"] = _outline(foot, place + rotation @ offset, rotation, size)
         if name in swings:
             picture[f"swing/{path}"] = _swing_path(swings[name], rotation @ offset)
@@ -132,10 +126,8 @@ def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
         radius = max(2.0 * foot.radius, 0.04 * size)
         return Item(_ring(COLOUR, 0.72), transform(at, rotation, radius))
     corners = np.round(foot.corners[:, :2] - foot.corners[:, :2].mean(axis=0), 4)
-    return Item(
-        _foot_outline(tuple(map(tuple, corners.tolist())), round(_OUTLINE_WIDTH * size, 4)),
-        transform(at, rotation),
-    )
+    width = round(_OUTLINE_WIDTH * size, 4)
+    return Item(_foot_outline(tuple(map(tuple, corners.tolist())), width), transform(at, rotation))
 
 
 def _offset_to_ground(foot: Foot, standing: State) -> Array:
@@ -154,32 +146,22 @@ def _swing_path(swing: SwingPath, offset: Array) -> Item:
     y = np.cross([0.0, 0.0, 1.0], x)
     y /= max(float(np.linalg.norm(y)), _MIN_LENGTH)
     scale = (max(length, _MIN_LENGTH), 1.0, max(swing.height, _MIN_LENGTH))
-    return Item(
-        _unit_swing_path(),
-        transform(swing.start + offset, np.stack([x, y, np.cross(x, y)], axis=1), scale),
-    )
+    rotation = np.stack([x, y, np.cross(x, y)], axis=1)
+    return Item(_unit_swing_path(), transform(swing.start + offset, rotation, scale))
 
 
 @lru_cache(maxsize=8)
 def _ring(colour: RGB, inner: float, on_top: bool = False) -> Shape:
     """Return a flat ring around z of radius 1 with the given inner radius."""
-    return threejs.mesh(
-        *geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36),
-        colour,
-        lit=False,
-        on_top=on_top,
-    )
+    ring = geometry.surface_of_revolution([(inner, 0.0), (1.0, 0.0)], 36)
+    return threejs.mesh(*ring, colour, lit=False, on_top=on_top)
 
 
 @lru_cache(maxsize=8)
 def _diamond(colour: RGB) -> Shape:
     """Return an octahedron standing on its tip, which looks like a diamond from all sides."""
-    return threejs.mesh(
-        *geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4),
-        colour,
-        lit=False,
-        on_top=True,
-    )
+    octahedron = geometry.surface_of_revolution([(0.0, 0.0), (0.6, 1.0), (0.0, 2.0)], 4)
+    return threejs.mesh(*octahedron, colour, lit=False, on_top=True)
 
 
 @lru_cache(maxsize=32)

@@ -25,6 +25,12 @@ def merged(meshes: Sequence[tuple[npt.ArrayLike, npt.ArrayLike]]) -> Mesh:
     return np.vstack(vertices).astype(np.float32), np.vstack(faces).astype(np.uint32)
 
 
+def vertex_colours(vertices: npt.ArrayLike, colour: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    """Return the same colour for all vertices, given as RGB from 0 to 1."""
+    code = np.round(255 * np.asarray(colour)).astype(np.uint8)
+    return np.tile(code, (len(np.asarray(vertices)), 1))
+
+
 def surface_of_revolution(profile: Sequence[tuple[float, float]], sides: int = 24) -> Mesh:
     """Make a surface of revolution around the z axis."""
     angles = 2.0 * np.pi * np.arange(sides) / sides
@@ -49,14 +55,8 @@ def sphere(radius: float, sides: int = 20) -> Mesh:
     """Make a sphere around the origin."""
     heights = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 1)
     angles = 2.0 * np.pi * np.arange(sides) / sides
-    rings = [
-        radius
-        * np.stack(
-            [np.cos(h) * np.cos(angles), np.cos(h) * np.sin(angles), np.full(sides, np.sin(h))],
-            axis=1,
-        )
-        for h in heights
-    ]
+    circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
+    rings = [radius * (np.cos(h) * circle + [0.0, 0.0, np.sin(h)]) for h in heights]
     bands = [_band(sides, k > 0, k < len(rings) - 2) + k * sides for k in range(len(rings) - 1)]
     return np.vstack(rings).astype(np.float32), np.vstack(bands).astype(np.uint32)
 
@@ -65,9 +65,8 @@ def cylinder(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int
     """Make a closed cylinder."""
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
-    vertices, faces = surface_of_revolution(
-        [(0, 0), (radius, 0), (radius, length), (0, length)], sides
-    )
+    profile = [(0, 0), (radius, 0), (radius, length), (0, length)]
+    vertices, faces = surface_of_revolution(profile, sides)
     return (vertices @ rotation_with_z_axis((b - a) / length).T + a).astype(np.float32), faces
 
 
@@ -93,12 +92,8 @@ def convex_polygon(corners: npt.ArrayLike) -> Mesh:
 def pyramid(rays: npt.ArrayLike) -> Mesh:
     """Make the sides of a pyramid with its tip at the origin; each side has its own vertices."""
     ends = np.asarray(rays, dtype=np.float32)
-    return merged(
-        [
-            convex_polygon([np.zeros(3), a, b])
-            for a, b in zip(ends, np.roll(ends, -1, axis=0), strict=True)
-        ]
-    )
+    pairs = zip(ends, np.roll(ends, -1, axis=0), strict=True)
+    return merged([convex_polygon([np.zeros(3), a, b]) for a, b in pairs])
 
 
 def torus_arc(radius: float, tube: float, start: float, end: float, sides: int = 40) -> Mesh:

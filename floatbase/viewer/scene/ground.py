@@ -21,8 +21,8 @@ MIN_VERTICAL = 0.2
 GRID_JUMP = 2.5
 # m; the height of the ground is rounded to this, so that it does not shake with the feet
 HEIGHT_STEP = 0.01
-# m: faces of boxes are drawn in pieces of this size, because the rasteriser of images drops a
-# triangle that begins behind the camera
+# m: faces of boxes are drawn in pieces of this size, because an image without a browser drops a
+# triangle with a corner behind the camera
 FACE_SIZE = 0.5
 EDGE_WIDTH = 8e-3  # m, width of the drawn edges of boxes
 EDGE_LIFT = 2e-3  # m by which edges of boxes are drawn above their faces, which would hide them
@@ -202,9 +202,8 @@ def _parts_above(plane: Plane, ends: Array) -> Array:
     clear = ends @ np.array(plane.normal) - plane.offset
     seen = clear.max(axis=1) > 0.0
     low, lines = np.maximum(-clear[seen], 0.0), ends[seen]
-    fraction = low / np.where(
-        low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0
-    )  # fraction of the line, at each end
+    # fraction of the line, at each end
+    fraction = low / np.where(low > 0.0, np.ptp(clear[seen], axis=1, keepdims=True), 1.0)
     return np.asarray(lines + fraction[:, :, None] * (lines[:, ::-1] - lines))
 
 

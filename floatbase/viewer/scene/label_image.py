@@ -45,13 +45,8 @@ def font(is_subscript: bool = False) -> ImageFont.FreeTypeFont | ImageFont.Image
     size = FONT_SIZE * (_SUBSCRIPT_SCALE if is_subscript else 1.0)
     spec = find_spec("matplotlib")
     if spec is not None and spec.submodule_search_locations:
-        font = (
-            Path(spec.submodule_search_locations[0])
-            / "mpl-data"
-            / "fonts"
-            / "ttf"
-            / "DejaVuSans.ttf"
-        )
+        folder = Path(spec.submodule_search_locations[0])
+        font = folder / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
         if font.is_file():
             return ImageFont.truetype(str(font), size)
     return ImageFont.load_default(size)

@@ -29,12 +29,8 @@ from floatbase.viewer.scene.shapes import (
 from floatbase.viewer.scene.threejs import Shape
 from floatbase.viewer.scene.unit_shapes import ARROW
 
-_CONE_CONSTRAINTS = (
-    "friction",
-    "normal force",
-    "largest normal force",
-)  # kinds of the constraints whose multipliers are shown
-# fraction of the largest multiplier: labels of smaller ones would only hide others
+# kinds of the constraints whose multipliers are shown
+_CONE_CONSTRAINTS = ("friction", "normal force", "largest normal force")
 _LEAST_SHOWN = 0.01  # fraction of the largest multiplier; labels of smaller ones would cover others
 OUTLINE = 0.6  # width of the outline of a push, as a fraction of the radius of its shaft
 
@@ -100,10 +96,8 @@ def curled_arrow(
         The arrow.
     """
     moment, radius = vector_and_length("a curled arrow", moment)
-    return Item(
-        _unit_curled_arrow(colour, on_top),
-        transform(position, geometry.rotation_with_z_axis(moment / radius), radius),
-    )
+    rotation = geometry.rotation_with_z_axis(moment / radius)
+    return Item(_unit_curled_arrow(colour, on_top), transform(position, rotation, radius))
 
 
 def push(
@@ -137,9 +131,8 @@ def push(
     width = arrow_width(length, size)
     rotation = geometry.rotation_with_z_axis(vector / length)
     shape = _outlined_arrow(colour, outline, max(round(2.0 * length / width), 1))
-    return Item(
-        shape, transform(np.asarray(position) - vector, rotation, (width / 2, width / 2, length))
-    )
+    start = np.asarray(position) - vector
+    return Item(shape, transform(start, rotation, (width / 2, width / 2, length)))
 
 
 def support_region(
@@ -208,17 +201,13 @@ def multiplier_labels(
     """
     qp, found = solution.qp, solution.multipliers
     forces = qp.blocks.get("forces", slice(0, 0))
-    rows = [
-        row for row in zip(qp.inequality_names, qp.G[:, forces], strict=True) if row[0] in found
-    ]
     labels = [
         (name, row)
-        for name, row in rows
-        if isinstance(name, ConstraintLabel) and name.kind in _CONE_CONSTRAINTS
+        for name, row in zip(qp.inequality_names, qp.G[:, forces], strict=True)
+        if name in found and isinstance(name, ConstraintLabel) and name.kind in _CONE_CONSTRAINTS
     ]
-    if forces.stop - forces.start != contacts.k or not {name.owner for name, _ in labels} <= set(
-        contacts.point_names
-    ):
+    owners = {name.owner for name, _ in labels}
+    if forces.stop - forces.start != contacts.k or not owners <= set(contacts.point_names):
         raise InputError(
             "The solution is not for these contacts. Give contacts and solution of the same "
             "command."
@@ -230,20 +219,15 @@ def multiplier_labels(
             continue
         i = contacts.point_names.index(name.owner)
         normal, own = contacts.normals[i], row[3 * i : 3 * i + 3]
-        across = own - normal * (
-            normal @ own
-        )  # the tangent that the facet faces, times the row's length
-        to_facet = (
-            normal - across * (normal @ own) / (across @ across)
-            if name.kind == "friction"
-            else 1.5 * normal
-        )
-        at = (
-            np.asarray(positions)[i] + height / 1.5 * to_facet
-        )  # the centroid of a triangle with its tip at the point
-        picture[f"/{name.replace('/', '_')}"] = label(
-            at, f"{float(f'{found[name]:.2g}'):g}", 0.042 * size
-        )
+        to_facet = 1.5 * normal
+        if name.kind == "friction":
+            # the tangent that the facet faces, times the row's length
+            across = own - normal * (normal @ own)
+            to_facet = normal - across * (normal @ own) / (across @ across)
+        # the centroid of a triangle with its tip at the point
+        at = np.asarray(positions)[i] + height / 1.5 * to_facet
+        text = f"{float(f'{found[name]:.2g}'):g}"
+        picture[f"/{name.replace('/', '_')}"] = label(at, text, 0.042 * size)
     return picture
 
 
@@ -296,19 +280,14 @@ def _outlined_arrow(colour: RGB, outline: RGB, slenderness: int) -> Shape:
     back = OUTLINE / slenderness
     top = tip + OUTLINE * math.hypot(1.0, 1.0 / opening) / slenderness
     wide, low = shaft + OUTLINE, neck - back
+    rim = opening * slenderness * (top - low)
     around = geometry.surface_of_revolution(
-        [
-            (0.0, -back),
-            (wide, -back),
-            (wide, low),
-            (opening * slenderness * (top - low), low),
-            (0.0, top),
-        ]
+        [(0.0, -back), (wide, -back), (wide, low), (rim, low), (0.0, top)]
     )
     parts = [around, geometry.surface_of_revolution(ARROW)]
     colours = [
-        np.tile(np.round(255 * np.array(c)), (len(p), 1))
-        for c, (p, _) in zip((outline, colour), parts, strict=True)
+        geometry.vertex_colours(vertices, c)
+        for c, (vertices, _) in zip((outline, colour), parts, strict=True)
     ]
     return threejs.mesh(*geometry.merged(parts), colours=np.vstack(colours), lit=False, on_top=True)
 
@@ -318,7 +297,7 @@ def _axes() -> Shape:
     """Return three rods of length 1."""
     rods = [geometry.cylinder(np.zeros(3), axis, 0.035) for axis in np.eye(3)]
     colours = [
-        np.tile(np.round(255 * np.array(colour)), (len(vertices), 1))
+        geometry.vertex_colours(vertices, colour)
         for colour, (vertices, _) in zip((X_AXIS, Y_AXIS, Z_AXIS), rods, strict=True)
     ]
     return threejs.mesh(*geometry.merged(rods), colours=np.vstack(colours), on_top=True)

@@ -42,12 +42,8 @@ def robot_meshes(robot: Robot) -> list[JointMesh]:
         )
     try:
         meshes = _from_urdf(robot)
-    except (
-        ImportError,
-        ValueError,
-        OSError,
-    ):  # no trimesh, or files that trimesh or Pinocchio cannot read
-        meshes = []
+    except (ImportError, ValueError, OSError):
+        meshes = []  # no trimesh, or files that trimesh or Pinocchio cannot read
     return meshes or _from_tree(robot)
 
 
@@ -56,23 +52,18 @@ def appearance_digest(urdf: str, moving: Collection[str]) -> str:
     root, visuals = ElementTree.fromstring(urdf), ElementTree.Element("looks")
     visuals.extend(root.findall("material"))
     for link in root.findall("link"):
-        ElementTree.SubElement(visuals, "link", name=link.get("name", "")).extend(
-            link.findall("visual")
-        )
+        copy = ElementTree.SubElement(visuals, "link", name=link.get("name", ""))
+        copy.extend(link.findall("visual"))
     for joint in root.findall("joint"):
         places = [] if joint.get("name") in moving else joint.findall("origin")
         ends = [*joint.findall("parent"), *joint.findall("child")]
-        ElementTree.SubElement(visuals, "joint", name=joint.get("name", "")).extend(
-            [*ends, *places]
-        )
-    for bolt in [
-        *visuals.findall("link[@name='world']"),
-        *visuals.findall("joint/parent[@link='world']/.."),
-    ]:
-        visuals.remove(bolt)
-    return sha256(
-        ElementTree.canonicalize(ElementTree.tostring(visuals), strip_text=True).encode()
-    ).hexdigest()
+        copy = ElementTree.SubElement(visuals, "joint", name=joint.get("name", ""))
+        copy.extend([*ends, *places])
+    for bolt in ("link[@name='world']", "joint/parent[@link='world']/.."):
+        for element in visuals.findall(bolt):
+            visuals.remove(element)
+    text = ElementTree.canonicalize(ElementTree.tostring(visuals), strip_text=True)
+    return sha256(text.encode()).hexdigest()
 
 
 @lru_cache(maxsize=32)
@@ -144,23 +135,19 @@ def _from_urdf(robot: Robot) -> list[JointMesh]:
     meshes = []
     for joint in sorted({piece.joint for piece in pieces}):
         own = [piece for piece in pieces if piece.joint == joint]
-        colours = [
-            np.tile(np.round(255 * piece.colour), (len(piece.mesh.vertices), 1)) for piece in own
-        ]
+        colours = [geometry.vertex_colours(piece.mesh.vertices, piece.colour) for piece in own]
         vertices, faces = geometry.merged(
             [(piece.mesh.vertices, piece.mesh.faces) for piece in own]
         )
-        meshes.append(JointMesh(joint, vertices, faces, np.vstack(colours).astype(np.uint8)))
+        meshes.append(JointMesh(joint, vertices, faces, np.vstack(colours)))
     return meshes
 
 
 def _from_tree(robot: Robot) -> list[JointMesh]:
     """Return a ball at each joint and a rod to each of its children."""
     model = robot.model
-    lengths = [
-        float(np.linalg.norm(placement.translation))
-        for placement in list(model.jointPlacements)[1:]
-    ]
+    places = list(model.jointPlacements)[1:]
+    lengths = [float(np.linalg.norm(place.translation)) for place in places]
     radius = 0.12 * float(np.median([length for length in lengths if length > 1e-3] or [0.2]))
     meshes = []
     for joint in range(model.njoints):
@@ -168,14 +155,11 @@ def _from_tree(robot: Robot) -> list[JointMesh]:
         ends += [foot_frame.placement.translation for foot_frame in _feet(robot, joint)]
         if joint == 0 and robot.is_floating:
             continue
-        shapes = [geometry.sphere(1.6 * radius)]
-        shapes += [
-            geometry.cylinder(np.zeros(3), end, radius)
-            for end in ends
-            if np.linalg.norm(end) > 1e-6
-        ]
+        ends = [end for end in ends if np.linalg.norm(end) > 1e-6]
+        rods = [geometry.cylinder(np.zeros(3), end, radius) for end in ends]
+        shapes = [geometry.sphere(1.6 * radius), *rods]
         vertices, faces = geometry.merged(shapes)
-        colours = np.tile(np.round(255 * np.array(ROBOT)), (len(vertices), 1)).astype(np.uint8)
+        colours = geometry.vertex_colours(vertices, ROBOT)
         meshes.append(JointMesh(joint, vertices, faces, colours))
     return meshes
 

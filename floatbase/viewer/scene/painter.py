@@ -9,11 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.distance import pdist
 
-from floatbase._validation import (
-    Array,
-    as_instance,
-    cached_property,
-)
+from floatbase._validation import Array, as_instance, cached_property
 from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FlatFootContact
 from floatbase.errors import InputError, unknown_name
@@ -77,19 +73,15 @@ class Painter:
                 for contact in contacts.friction_contacts
                 for _ in contact.point_names
             ]
-            picture |= self._contacts(
-                contacts, positions, both, chosen.cones, stands, chosen.arrows
-            )
+            picture |= self._contacts(contacts, positions, both, stands, chosen)
             if chosen.support:
-                picture |= prefixed(
-                    "support", markers.support_region(positions[stands], 0.004 * self.size, ground)
-                )
+                region = markers.support_region(positions[stands], 0.004 * self.size, ground)
+                picture |= prefixed("support", region)
             if chosen.labels:
                 picture |= self._labels(state, contacts, positions)
         if chosen.com:
-            picture |= prefixed(
-                "com", shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
-            )
+            com = shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
+            picture |= prefixed("com", com)
         if chosen.joint_limits:
             picture |= self._limit_rings(state, chosen)
         if chosen.wrench is not None:
@@ -102,13 +94,10 @@ class Painter:
             picture |= self._robot(chosen.ghost, "ghost", self._ghost_shapes)
         for name in chosen.frames:
             pose = state.frame_pose(name).homogeneous
-            picture |= prefixed(
-                f"frame/{path_part(name)}", markers.frame_axes(pose, 0.25 * self.size, name)
-            )
-        if any(
-            path.split("/")[0] in ("measured", "planned", "cone", "push", "wrench")
-            for path in picture
-        ):
+            axes = markers.frame_axes(pose, 0.25 * self.size, name)
+            picture |= prefixed(f"frame/{path_part(name)}", axes)
+        kinds = {path.split("/")[0] for path in picture}
+        if kinds & {"measured", "planned", "cone", "push", "wrench"}:
             picture |= self._scale_bar(ground)
         return picture | dict(chosen.extra or {})
 
@@ -159,11 +148,8 @@ class Painter:
         if not points:
             return self.box
         around = 0.2 * self.size * np.array([1.0, 1.0, 0.0])
-        return np.min(points, axis=0) - around, np.max(points, axis=0) + around + [
-            0.0,
-            0.0,
-            0.35 * self.size,
-        ]
+        above = np.array([0.0, 0.0, 0.35 * self.size])
+        return np.min(points, axis=0) - around, np.max(points, axis=0) + around + above
 
     @cached_property
     def size(self) -> float:
@@ -176,25 +162,18 @@ class Painter:
         """Length of a drawn force [m/N]."""
         if self.requested_scale is not None:
             return self.requested_scale
-        return geometry.round_1_2_5(
-            2.0
-            * max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size)
-            / self.robot.weight
-        )
+        height = max(float(self.standing.com[2] - self.box[0][2]), 0.6 * self.size)
+        return geometry.round_1_2_5(2.0 * height / self.robot.weight)
 
     def cone_height(self, contacts: Contacts) -> float:
         """Return the height of the friction cones."""
-        height = min(
-            self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2), 0.55 * self.size
-        )
-        feet = (
-            contact
-            for contact in contacts
-            if isinstance(contact, FlatFootContact) and contact.mu > 0
-        )
-        return min(
-            [height] + [CORNER_RADIUS * float(pdist(foot.corners).min()) / foot.mu for foot in feet]
-        )
+        height = self.scale * 1.5 * self.robot.weight / max(contacts.n_points, 2)
+        heights = [height, 0.55 * self.size]
+        for contact in contacts:
+            if isinstance(contact, FlatFootContact) and contact.mu > 0:
+                radius = CORNER_RADIUS * float(pdist(contact.corners).min())
+                heights.append(radius / contact.mu)
+        return min(heights)
 
     @cached_property
     def _meshes(self) -> list[JointMesh]:
@@ -217,7 +196,7 @@ class Painter:
         ]
 
     @cached_property
-    def _paths(self) -> list[tuple[int, str]]:
+    def paths(self) -> list[tuple[int, str]]:
         """Joint index and joint name, as part of a path, of each mesh."""
         return [
             (mesh.joint, path_part(self.robot.model.names[mesh.joint])) for mesh in self._meshes
@@ -228,7 +207,7 @@ class Painter:
         poses = state.joint_transforms
         return {
             f"{root}/{name}": Item(shape, poses[joint])
-            for (joint, name), shape in zip(self._paths, shapes_of_joints, strict=True)
+            for (joint, name), shape in zip(self.paths, shapes_of_joints, strict=True)
         }
 
     def _contacts(
@@ -236,9 +215,8 @@ class Painter:
         contacts: Contacts,
         positions: Array,
         forces: Forces,
-        cones: bool,
         stands: list[bool],
-        arrows: bool,
+        chosen: PictureOptions,
     ) -> Picture:
         """Draw forces at all points, and patches and cones at those on the ground."""
         picture: Picture = {}
@@ -248,19 +226,18 @@ class Painter:
         for i, (name, position, normal, mu) in enumerate(rows):
             at = path_part(name)
             if stands[i]:
-                picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self._patch_radius)
-            if cones and stands[i]:
+                picture[f"patch/{at}"] = shapes.contact_patch(position, normal, self.patch_radius)
+            if chosen.cones and stands[i]:
                 force = None if forces.cone_forces is None else forces.cone_forces[i]
                 if force is not None and self._is_negligible(force):
                     force = None
                 cone = cone_picture(shape, position, normal, float(mu), height, force)
                 picture |= prefixed(f"cone/{at}", cone)
-            for kind, vectors, colour in forces.kinds if arrows else ():
+            for kind, vectors, colour in forces.kinds if chosen.arrows else ():
                 if vectors is not None and not self._is_negligible(vectors[i]):
-                    vector = self.scale * vectors[i]
-                    picture[f"{kind}/{at}"] = shapes.arrow(
-                        position, vector, colour, self.size, halo=kind == "planned"
-                    )
+                    vector, halo = self.scale * vectors[i], kind == "planned"
+                    arrow = shapes.arrow(position, vector, colour, self.size, halo)
+                    picture[f"{kind}/{at}"] = arrow
         return picture
 
     def _is_negligible(self, force: Array) -> bool:
@@ -280,36 +257,28 @@ class Painter:
             middle = positions[rows].mean(axis=0)
             away = (middle - state.com) * [1.0, 1.0, 0.0]
             towards = away / max(float(np.linalg.norm(away)), 1e-6)
-            beyond = 0.12 * self.size + float(
-                np.linalg.norm(positions[rows] - middle, axis=1).max()
-            )
-            picture[f"label/{path_part(contact.name)}"] = shapes.label(
-                middle + beyond * towards, contact.name, 0.06 * self.size
-            )
+            radius = float(np.linalg.norm(positions[rows] - middle, axis=1).max())
+            at = middle + (0.12 * self.size + radius) * towards
+            name = path_part(contact.name)
+            picture[f"label/{name}"] = shapes.label(at, contact.name, 0.06 * self.size)
             for i, row in enumerate(rows if len(rows) > 1 else ()):
                 at = positions[row] + 0.25 * (positions[row] - middle)
-                picture[f"label/{path_part(contacts.point_names[row])}"] = shapes.label(
-                    at, str(i), 0.035 * self.size
-                )
+                name = path_part(contacts.point_names[row])
+                picture[f"label/{name}"] = shapes.label(at, str(i), 0.035 * self.size)
         return picture
 
     def _wrench(self, state: State, six: Array) -> Picture:
         """Draw a wrench at the centre of mass."""
-        drawn = markers.wrench(
-            state.com, self.scale * six[:3], self.scale / self.size * six[3:], self.size
-        )
-        return prefixed("wrench", drawn)
+        force, moment = self.scale * six[:3], self.scale / self.size * six[3:]
+        return prefixed("wrench", markers.wrench(state.com, force, moment, self.size))
 
     def _push(self, state: State, frame: str, force: Array) -> Picture:
         """Draw a push at a frame, unless it is negligible."""
         if self._is_negligible(force):
             return {}
         at = state.frame_pose(frame).translation
-        return {
-            "push": markers.push(
-                at, self.scale * force, self.size, self.text_colour, self.background_colour
-            )
-        }
+        colours = self.text_colour, self.background_colour
+        return {"push": markers.push(at, self.scale * force, self.size, *colours)}
 
     def _limit_rings(self, state: State, chosen: PictureOptions) -> Picture:
         """Draw rings at joints near their limits, and at joints whose limits are active."""
@@ -324,7 +293,7 @@ class Painter:
         return JointLimits.of(self.robot)
 
     @cached_property
-    def _patch_radius(self) -> float:
+    def patch_radius(self) -> float:
         """Radius of the contact patches [m]."""
         return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
 

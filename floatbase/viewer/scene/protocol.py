@@ -12,9 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+import msgpack
 import numpy as np
 import numpy.typing as npt
-import umsgpack
 
 from floatbase._validation import Array
 from floatbase.errors import ViewerError
@@ -32,9 +32,8 @@ TYPES = (
 
 ANIMATION: Key = ("/", "set_animation", "")
 _MAX_CONTROL_VALUE = 1e18  # of a slider: MessagePack's integers end at 1.8e19
-_FLOAT32 = np.dtype(
-    [("code", "u1"), ("value", ">f4")]
-)  # MessagePack: the byte 0xca, then a big-endian float
+# MessagePack: the byte 0xca, then a big-endian float
+_FLOAT32 = np.dtype([("code", "u1"), ("value", ">f4")])
 
 
 def encode(command: Mapping[str, Any]) -> Update:
@@ -43,9 +42,8 @@ def encode(command: Mapping[str, Any]) -> Update:
     if kind not in TYPES:
         raise ViewerError(f"Unknown viewer command {kind!r}. Known commands: {', '.join(TYPES)}.")
     path = normal_path(command.get("path", ""))
-    return (path, kind, str(command.get("property", command.get("name", "")))), umsgpack.packb(
-        dict(command)
-    )
+    key = (path, kind, str(command.get("property", command.get("name", ""))))
+    return key, msgpack.packb(dict(command))
 
 
 def set_transform(path: str, matrix: Array) -> Update:
@@ -73,9 +71,8 @@ def set_property(path: str, name: str, value: Any) -> Update:
 def set_object(path: str, packed: bytes) -> Update:
     """Put an object at a path."""
     path = normal_path(path)
-    return (path, "set_object", ""), b"\x83\xa4type\xaaset_object\xa4path" + _text(
-        path
-    ) + b"\xa6object" + packed
+    head = b"\x83\xa4type\xaaset_object\xa4path" + _text(path)
+    return (path, "set_object", ""), head + b"\xa6object" + packed
 
 
 def _text(text: str) -> bytes:
@@ -98,16 +95,8 @@ def set_camera(position: npt.ArrayLike, target: npt.ArrayLike, angle: float) -> 
 def set_follow(node: str, start: npt.ArrayLike, begin: npt.ArrayLike, smooth: bool) -> Update:
     """Let the camera follow an object at a constant height above the ground."""
     at, moved = _to_threejs(start), _to_threejs(begin)
-    return encode(
-        {
-            "type": "set_follow",
-            "path": "",
-            "node": node,
-            "from": at,
-            "begin": moved,
-            "smooth": smooth,
-        }
-    )
+    values = {"node": node, "from": at, "begin": moved, "smooth": smooth}
+    return page_command("set_follow", **values)
 
 
 def set_ground(
@@ -116,7 +105,7 @@ def set_ground(
     """Define the ground above which a following camera keeps its height."""
     in_threejs = [{"normal": _to_threejs(normal), "offset": offset} for normal, offset in planes]
     bounds = [[float(bound) for bound in box] for box in boxes]
-    return encode({"type": "set_ground", "path": "", "planes": in_threejs, "boxes": bounds})
+    return page_command("set_ground", planes=in_threejs, boxes=bounds)
 
 
 def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -> Update:
@@ -125,7 +114,7 @@ def set_views(views: Mapping[str, tuple[npt.ArrayLike, npt.ArrayLike, float]]) -
         name: {"position": _to_threejs(eye), "target": _to_threejs(at), "fov": fov}
         for name, (eye, at, fov) in views.items()
     }
-    return encode({"type": "set_views", "path": "", "views": named})
+    return page_command("set_views", views=named)
 
 
 def page_command(kind: str, **values: Any) -> Update:
@@ -135,9 +124,7 @@ def page_command(kind: str, **values: Any) -> Update:
 
 def no_animation() -> Update:
     """End an animation: all objects return to where they were before it."""
-    return encode(
-        {"type": "set_animation", "path": "", "animations": [], "options": {"play": False}}
-    )
+    return page_command("set_animation", animations=[], options={"play": False})
 
 
 def end_animation() -> list[Update]:
@@ -164,11 +151,9 @@ def checked_control_value(command: dict[str, Any], value: Any) -> Any:
         raise ViewerError(f"The control {command['name']!r} cannot have the value {value!r}.")
     if "choices" in command:
         return min(max(round(value), 0), len(command["choices"]) - 1)
-    return (
-        value
-        if is_switch
-        else min(max(value, command.get("min", value)), command.get("max", value))
-    )
+    if is_switch:
+        return value
+    return min(max(value, command.get("min", value)), command.get("max", value))
 
 
 def _to_threejs(point: npt.ArrayLike) -> list[float]:

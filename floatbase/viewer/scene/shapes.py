@@ -14,26 +14,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import (
-    Array,
-    as_array,
-    as_instance,
-    as_positive,
-    as_string,
-    read_only,
-)
+from floatbase._validation import Array, as_array, as_instance, as_positive, as_string, read_only
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron, tangents
 from floatbase.viewer.scene import geometry, threejs, unit_shapes
-from floatbase.viewer.scene.colours import (
-    COM,
-    CONE,
-    CONE_ALPHA,
-    PATCH,
-    RGB,
-    RGBA,
-    with_alpha,
-)
+from floatbase.viewer.scene.colours import COM, CONE, CONE_ALPHA, PATCH, RGB, RGBA, with_alpha
 from floatbase.viewer.scene.threejs import Shape
 
 # width of an arrow's shaft divided by its length, for an arrow of length `ARROW_LENGTH`
@@ -354,12 +339,7 @@ def friction_polyhedron(
     """
     as_positive("height of a friction polyhedron", height, "m")
     matrix = transform(position, _contact_axes(polyhedron.normal), height)
-    key = (
-        float(polyhedron.mu),
-        int(polyhedron.facets),
-        bool(polyhedron.inner_approximation),
-        float(polyhedron.facet_rotation),
-    )
+    key = _facets_key(polyhedron)
     picture = {"/sides": Item(unit_shapes.polyhedron(*key), matrix, cone_colour(status))}
     for facet in np.atleast_1d(np.asarray(active, dtype=int)):
         picture[f"/facet {facet}"] = Item(unit_shapes.facet(*key, int(facet)), matrix)
@@ -391,17 +371,10 @@ def cone_rim(
     """
     frame = _contact_axes(polyhedron.normal)
     if is_round:
-        return Item(
-            unit_shapes.round_rim(),
-            transform(position, frame, (polyhedron.mu * height, polyhedron.mu * height, height)),
-        )
-    key = (
-        float(polyhedron.mu),
-        int(polyhedron.facets),
-        bool(polyhedron.inner_approximation),
-        float(polyhedron.facet_rotation),
-    )
-    return Item(unit_shapes.polygonal_rim(*key), transform(position, frame, height))
+        radius = polyhedron.mu * height
+        return Item(unit_shapes.round_rim(), transform(position, frame, (radius, radius, height)))
+    rim = unit_shapes.polygonal_rim(*_facets_key(polyhedron))
+    return Item(rim, transform(position, frame, height))
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
@@ -422,10 +395,8 @@ def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float)
         The disc.
     """
     as_positive("radius of a contact patch", radius, "m")
-    return Item(
-        unit_shapes.disc(PATCH),
-        transform(position, _contact_axes(normal), (radius, radius, 0.12 * radius)),
-    )
+    scale = (radius, radius, 0.12 * radius)
+    return Item(unit_shapes.disc(PATCH), transform(position, _contact_axes(normal), scale))
 
 
 def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
@@ -448,16 +419,12 @@ def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Pictu
     x, y, z = np.asarray(position, dtype=np.float64)
     radius = 0.04 * size
     foot = np.array([x, y, ground])
+    line = transform(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4)))
+    projection = transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius))
     return {
         "/ball": Item(unit_shapes.sphere(COM, True), transform([x, y, z], scale=radius)),
-        "/line": Item(
-            unit_shapes.cylinder(COM),
-            transform(foot, scale=(0.1 * radius, 0.1 * radius, max(z - ground, 1e-4))),
-        ),
-        "/projection": Item(
-            unit_shapes.disc(COM),
-            transform(foot, scale=(0.8 * radius, 0.8 * radius, 0.12 * radius)),
-        ),
+        "/line": Item(unit_shapes.cylinder(COM), line),
+        "/projection": Item(unit_shapes.disc(COM), projection),
     }
 
 
@@ -488,12 +455,8 @@ def label(
     Item
         The label.
     """
-    return Item(
-        unit_shapes.label(
-            text, as_positive("height of a label's letters", height, "m"), plate, colour
-        ),
-        transform(position),
-    )
+    as_positive("height of a label's letters", height, "m")
+    return Item(unit_shapes.label(text, height, plate, colour), transform(position))
 
 
 def scale_bar(
@@ -522,23 +485,14 @@ def scale_bar(
     start = np.asarray(position, dtype=np.float64)
     along = geometry.rotation_with_z_axis([1.0, 0.0, 0.0])
     thick = 0.012 * size
-    text_at = start + np.array(
-        [length / 2, 0.17 * size, 0.03 * size]
-    )  # beside the bar, which looks short when seen from its end
-    picture = {
-        "/bar": Item(
-            unit_shapes.cylinder(colour), transform(start, along, (thick / 2, thick / 2, length))
-        )
-    }
+    rod = unit_shapes.cylinder(colour)
+    picture = {"/bar": Item(rod, transform(start, along, (thick / 2, thick / 2, length)))}
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
-        picture[end] = Item(
-            unit_shapes.cylinder(colour),
-            transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)),
-        )
-    words = unit_shapes.label(
-        f"{force:g} N", 0.055 * size, True, colour, False
-    )  # hidden by the robot, as the bar is
+        picture[end] = Item(rod, transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
+    # beside the bar, which looks short when seen from its end, and hidden by the robot, as it is
+    text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])
+    words = unit_shapes.label(f"{force:g} N", 0.055 * size, True, colour, False)
     return picture | {"/label": Item(words, transform(text_at))}
 
 
@@ -653,6 +607,14 @@ def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
     along_x = np.stack([start, line, start + step, line], axis=1).reshape(-1, 2)
     points = np.vstack([along_x, along_x[:, ::-1]])
     return np.hstack([points, np.zeros((len(points), 1))])
+
+
+def _facets_key(polyhedron: FrictionPolyhedron) -> tuple[float, int, bool, float]:
+    """Return what determines the shape of a polyhedron, as plain values."""
+    return (
+        float(polyhedron.mu), int(polyhedron.facets),
+        bool(polyhedron.inner_approximation), float(polyhedron.facet_rotation),
+    )  # fmt: skip
 
 
 def _contact_axes(normal: npt.ArrayLike) -> Array:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterable
 from typing import Any
 
-import umsgpack
+import msgpack
 
 from floatbase.errors import ViewerError
 from floatbase.viewer.scene.protocol import Key, Update, checked_control_value, encode
@@ -33,28 +33,25 @@ class Scene:
             raise ViewerError(f"There is no control {name!r}.")
         value = checked_control_value(control, value)
         if value is not None:
-            self.put(
-                [encode({"type": "set_control_value", "name": name, "value": value, "by": page})]
-            )
+            command = {"type": "set_control_value", "name": name, "value": value, "by": page}
+            self.put([encode(command)])
         return value
 
     def since(self, number: int) -> tuple[int, list[bytes]]:
         """Return the commands stored after a change."""
         with self._lock:
             newest, entries = self.newest, list(self._entries.values())
-        return newest, [
-            command for _, command in sorted(entry for entry in entries if entry[0] > number)
-        ]
+        return newest, [command for when, command in sorted(entries) if when > number]
 
     def command(self, key: Key) -> dict[str, Any] | None:
         """Return the decoded command of a key."""
         with self._lock:
             entry = self._entries.get(key)
-        return None if entry is None else umsgpack.unpackb(entry[1])
+        return None if entry is None else msgpack.unpackb(entry[1])
 
     def commands(self) -> dict[Key, dict[str, Any]]:
         """Return the scene as decoded commands."""
-        return {key: umsgpack.unpackb(command) for key, command in self._sorted_entries()}
+        return {key: msgpack.unpackb(command) for key, command in self._sorted_entries()}
 
     def file_commands(self) -> list[bytes]:
         """Return the commands that a file can hold."""
@@ -62,13 +59,8 @@ class Scene:
 
     def file_entries(self) -> list[tuple[Key, bytes]]:
         """Return keys and commands of `file_commands`."""
-        return [
-            entry
-            for entry in self._sorted_entries()
-            if not entry[0][1].endswith(
-                ("_control", "_control_value", "set_text", "add_plot_point")
-            )
-        ]
+        of_panel = ("_control", "_control_value", "set_text", "add_plot_point")
+        return [entry for entry in self._sorted_entries() if not entry[0][1].endswith(of_panel)]
 
     def __len__(self) -> int:
         return len(self._entries)

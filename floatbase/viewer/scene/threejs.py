@@ -8,28 +8,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import msgpack
 import numpy as np
 import numpy.typing as npt
-import umsgpack
 
 from floatbase._validation import cached_property
 from floatbase.viewer.scene.colours import RGB
 from floatbase.viewer.scene.label_image import FONT_SIZE, text_image
 
-_EXT = {
-    "Uint8Array": 0x12,
-    "Int16Array": 0x13,
-    "Uint16Array": 0x14,
-    "Uint32Array": 0x16,
+# arrays of JavaScript: their codes in MessagePack, and their types in NumPy
+_EXT_CODES = {
+    "Uint8Array": 0x12, "Int16Array": 0x13, "Uint16Array": 0x14, "Uint32Array": 0x16,
     "Float32Array": 0x17,
-}
-_TYPES = {
-    "Uint8Array": "u1",
-    "Int16Array": "<i2",
-    "Uint16Array": "<u2",
-    "Uint32Array": "<u4",
+}  # fmt: skip
+TYPES = {
+    "Uint8Array": "u1", "Int16Array": "<i2", "Uint16Array": "<u2", "Uint32Array": "<u4",
     "Float32Array": "<f4",
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,30 +37,27 @@ class Shape:
     @cached_property
     def packed(self) -> bytes:
         """Object in MessagePack for `protocol.set_object`, packed once for all pictures."""
-        return umsgpack.packb(self.data)
+        return msgpack.packb(self.data)
+
+
+def packed_array(kind: str, values: npt.ArrayLike) -> msgpack.ExtType:
+    """Return numbers as an array of JavaScript."""
+    raw = np.ascontiguousarray(values, dtype=TYPES[kind]).tobytes()
+    return msgpack.ExtType(_EXT_CODES[kind], raw)
 
 
 def _array(kind: str, values: npt.ArrayLike, size: int, normalized: bool = False) -> dict[str, Any]:
     """Return an attribute of a geometry."""
-    raw = np.ascontiguousarray(values, dtype=_TYPES[kind]).tobytes()
-    return {
-        "itemSize": size,
-        "type": kind,
-        "array": umsgpack.Ext(_EXT[kind], raw),
-        "normalized": normalized,
-    }
+    array = packed_array(kind, values)
+    return {"itemSize": size, "type": kind, "array": array, "normalized": normalized}
 
 
 def _object(
     kind: str, geometry: dict[str, Any] | None, material: dict[str, Any], scale: float = 1.0
 ) -> dict[str, Any]:
     """Return an object with its geometry and material."""
-    object_data: dict[str, Any] = {
-        "uuid": "object",
-        "type": kind,
-        "name": "shape",
-        "material": "material",
-    }
+    object_data: dict[str, Any] = {"uuid": "object", "type": kind, "name": "shape"}
+    object_data["material"] = "material"
     object_data["matrix"] = [float(x) for x in np.diag([scale, scale, scale, 1.0]).ravel()]
     data: dict[str, Any] = {"metadata": {"version": 4.5, "type": "Object"}}
     if geometry is not None:
@@ -140,33 +132,21 @@ def label(
     """Make text that always faces the viewer."""
     image_data = text_image(text, plate, colour)
     tall, wide = image_data.shape[:2]
-    image = {
-        "type": "Uint8Array",
-        "width": wide,
-        "height": tall,
-        "data": umsgpack.Ext(0x12, image_data[::-1].tobytes()),
-    }
+    pixels = packed_array("Uint8Array", image_data[::-1])
+    image = {"type": "Uint8Array", "width": wide, "height": tall, "data": pixels}
     material = {
-        "type": "SpriteMaterial",
-        "map": "texture",
-        "transparent": True,
-        "depthTest": not on_top,
-        "depthWrite": False,
-    }
+        "type": "SpriteMaterial", "map": "texture", "transparent": True,
+        "depthTest": not on_top, "depthWrite": False,
+    }  # fmt: skip
     data = _object("Sprite", None, material)
     data["images"] = [{"uuid": "image", "url": image}]
     # 1025: two bytes per pixel, grey and alpha; 1006: smooth scaling
     texture = {
-        "uuid": "texture",
-        "image": "image",
-        "format": 1025,
-        "minFilter": 1006,
-        "magFilter": 1006,
-    }
-    data["textures"] = [texture | {"generateMipmaps": False}]
+        "uuid": "texture", "image": "image", "format": 1025, "minFilter": 1006,
+        "magFilter": 1006, "generateMipmaps": False,
+    }  # fmt: skip
+    data["textures"] = [texture]
     size = height / FONT_SIZE
-    data["object"]["matrix"] = [
-        float(x) for x in np.diag([wide * size, tall * size, 1.0, 1.0]).ravel()
-    ]
+    data["object"]["matrix"] = np.diag([wide * size, tall * size, 1.0, 1.0]).ravel().tolist()
     data["object"]["renderOrder"] = 10
     return Shape(data, text)

@@ -19,14 +19,12 @@ from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.store import Scene
 
-TIMEOUT = (
-    30.0  # s; a page that takes longer for one frame is disconnected, and reconnects by itself
-)
+# s; a page that takes longer for one frame is disconnected, and reconnects by itself
+TIMEOUT = 30.0
 # s between frames for a page whose answers are delayed until a cell has ended
 UNANSWERED_INTERVAL = 0.05
-MAX_UNANSWERED = (
-    32 << 20
-)  # bytes in flight to it: half an hour of a walking robot's frames, or the whole scene many times
+# bytes in flight to it: half an hour of a walking robot's frames, or the whole scene many times
+MAX_UNANSWERED = 32 << 20
 
 
 class Host(Protocol):
@@ -67,9 +65,8 @@ class Connection:
         self.host, self.channel = host, channel
         self.sent = 0
         self._frames, self._last = 0, 0.0  # number of frames sent, and time of the last one
-        self._in_flight: deque[tuple[int, float, int]] = (
-            deque()
-        )  # number, time and size of each frame
+        # number, time and size of each frame
+        self._in_flight: deque[tuple[int, float, int]] = deque()
         host.clients.append(self)
 
     def close(self) -> None:
@@ -107,12 +104,10 @@ class Connection:
         try:
             if self.host.on_control is not None:
                 self.host.on_control(name, value)
-        except (
-            Exception
-        ):  # an error in the user's callback is reported, and must not end the connection
-            logging.getLogger("floatbase.viewer").exception(
-                "The callback of the control %r failed.", name
-            )
+        except Exception:
+            # an error in the user's callback is reported, and must not end the connection
+            logger = logging.getLogger("floatbase.viewer")
+            logger.exception("The callback of the control %r failed.", name)
 
     def next_frame(self) -> float:
         """Send the changes that the page has not received, if a frame may be sent now."""
@@ -133,10 +128,7 @@ class Connection:
         """Return how long the next frame must wait [s]; disconnect a page that has timed out."""
         if not self._frames:
             return 0.0
-        answers_since, rest = (
-            self.channel.answers_since,
-            self._last + self.channel.min_interval - now,
-        )
+        answers_since = self.channel.answers_since
         if self._in_flight and answers_since is None:
             is_full = sum(size for *_, size in self._in_flight) > MAX_UNANSWERED
             return math.inf if is_full else max(self._last + UNANSWERED_INTERVAL - now, 0.0)
@@ -144,4 +136,6 @@ class Connection:
             self.close()
             self.channel.close_page("the page does not respond")
             return math.inf
-        return math.inf if len(self._in_flight) >= self.channel.max_in_flight else max(rest, 0.0)
+        if len(self._in_flight) >= self.channel.max_in_flight:
+            return math.inf
+        return max(self._last + self.channel.min_interval - now, 0.0)

@@ -24,10 +24,8 @@ from floatbase.viewer.transport.notebook_events import receive_during_cells
 from floatbase.viewer.transport.server import Server
 from floatbase.viewer.web import pages
 
-FRAME_INTERVAL = (
-    1.0 / 30.0
-    # s between frames: each is a message of the kernel, and Jupyter accepts at most 1000 a second
-)
+# s between frames: each is a message of the kernel, and Jupyter accepts at most 1000 a second
+FRAME_INTERVAL = 1.0 / 30.0
 _MAX_IN_FLIGHT = 2  # frames: so a distant page gets one per half of the round-trip time
 _MAX_PAGES = 50  # of one display; a page that closed silently is dropped after this many others
 
@@ -60,9 +58,7 @@ class _OutputPages:
     def __init__(self, widget: NotebookWidget, server: Server):
         self._widget, self._server = weakref.ref(widget), weakref.ref(server)
         self._pages: dict[str, _WidgetChannel] = {}
-        server.on_stop[:] = [
-            stop_callback for stop_callback in server.on_stop if stop_callback() is not None
-        ]
+        server.on_stop[:] = [callback for callback in server.on_stop if callback() is not None]
         server.on_stop.append(weakref.WeakMethod(self._stop))
 
     def receive(self, _: Any, content: Any, buffers: Any) -> None:
@@ -70,20 +66,13 @@ class _OutputPages:
         server = self._server()
         if server is None or not server.is_running:
             return self._send_closed()
-        if (
-            isinstance(content, dict)
-            and isinstance(content.get("say"), str)
-            and isinstance(content.get("page"), str)
-        ):
+        page, say = (
+            (content.get("page"), content.get("say")) if isinstance(content, dict) else ("", 0)
+        )
+        if isinstance(page, str) and isinstance(say, str):
             answers_wait = threading.current_thread() is threading.main_thread()
-            server.call(
-                self._handle,
-                server,
-                content["page"][:40],
-                content["say"],
-                answers_wait,
-                contextvars.copy_context(),
-            )
+            context = contextvars.copy_context()
+            server.call(self._handle, server, page[:40], say, answers_wait, context)
 
     def _handle(
         self, server: Server, name: str, say: str, answers_wait: bool, context: contextvars.Context
@@ -157,8 +146,7 @@ class _WidgetChannel(Channel):
         answers_wait: bool,
         context: contextvars.Context,
     ):
-        self.name, self.answers_wait = name, answers_wait
-        self.context = context
+        self.name, self.answers_wait, self.context = name, answers_wait, context
         self._display, self._cells = display, server.cells
 
     @property

@@ -126,9 +126,8 @@ class Server:
         wait = min([client.next_frame() for client in list(self.clients)], default=math.inf)
         if wait < math.inf:
             self.flush(wait)
-        self.scene.sent_to_all = min(
-            (client.sent for client in self.clients), default=self.scene.newest
-        )
+        sent = [client.sent for client in self.clients]
+        self.scene.sent_to_all = min(sent, default=self.scene.newest)
 
 
 class _Guarded(tornado.web.RequestHandler):
@@ -180,8 +179,8 @@ class _Socket(_Guarded, tornado.websocket.WebSocketHandler, Channel):
         self.page.receive(message)
 
     def send_frame(self, number: int, data: bytes) -> None:
-        # when the page has gone, `on_close` cleans up
         """Send a frame."""
+        # when the page has gone, `on_close` cleans up
         with suppress(tornado.websocket.WebSocketClosedError):
             self.write_message(data, binary=True).add_done_callback(
                 lambda done: done.cancelled() or done.exception()

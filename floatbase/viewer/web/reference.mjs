@@ -12,7 +12,8 @@ const numbers = (bytes) => new Float64Array(bytes.buffer.slice(bytes.byteOffset,
 const read = (name) => readFileSync(`${folder}/${name}`);
 const given = {
   mj: await loadMujoco(),
-  module: new WebAssembly.Module(readFileSync(wasm ?? new URL("live/tick.wasm", import.meta.url))),
+  module: new WebAssembly.Module(
+    readFileSync(wasm ?? new URL("../../live/tick.wasm", import.meta.url))),
   files: Object.fromEntries([...FILES.map((name) => [name, JSON.parse(read(name))]),
     ...NUMBERS.map((name) => [name, numbers(read(name))])]),
 };

@@ -10,7 +10,7 @@ from floatbase.lessons.publish.site.addresses import PACKAGES, exported
 from floatbase.lessons.publish.site.answers import (
     exercise_form,
     prediction_form,
-    printed_results,
+    results,
 )
 from floatbase.lessons.publish.site.build import SITE, build, replace_site
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
@@ -27,8 +27,8 @@ __all__ = [
     "mathml",
     "prediction_form",
     "prepare_lesson",
-    "printed_results",
     "recall",
     "replace_site",
+    "results",
     "run_lessons",
 ]

@@ -1,7 +1,7 @@
 """Forms for predictions and exercises in the pages of the site, judged in the reader's browser.
 
-A page has the intervals and choices that count as right. They come from the results that the lesson
-prints and from the judges of its exercises.
+A page has the intervals and choices that count as right. They come from the results that the cells
+of the lesson show with `compare`, and from the judges of its exercises.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -17,57 +17,45 @@ from nbformat.v4 import new_markdown_cell
 
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import NEAR_MISS, NumericJudge, ShapeJudge, general_hint
-from floatbase.lessons.predictions import accepted, lesson_name
-from floatbase.lessons.questions import predict_call
+from floatbase.lessons.predictions import RESULT_MIME, accepted, lesson_name
+from floatbase.lessons.questions import Question
 from floatbase.lessons.submission import FILE_FORMAT
 
 MAX_NUMBERS = 4  # of an answer that is typed into a page
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e-?\d+)?")
 _LIVE = "../installation.md"
 _LINK = f'<a href="{_LIVE.removesuffix(".md")}.html">the live lesson</a>'
 
 
-def printed_results(cells: Iterable[Any]) -> dict[str, str]:
-    """Return the results that the cells of a lesson print with `compare`, by prediction."""
-    found = {}
-    for cell in cells:
-        for output in cell.get("outputs", []):
-            if output.output_type == "stream":
-                lines = re.findall(r"^(\w+\.[a-z]): (.+)$", output.text, re.MULTILINE)
-                found.update({name: text for name, text in lines if not text.startswith("skipped")})
-    return found
+def results(cells: Iterable[Any]) -> dict[str, dict[str, Any]]:
+    """Return the results that the cells of a lesson show with `compare`, by prediction."""
+    outputs = (output.get("data", {}) for cell in cells for output in cell.get("outputs", []))
+    shown = (data[RESULT_MIME] for data in outputs if RESULT_MIME in data)
+    return {result["name"]: result for result in shown}
 
 
-def prediction_form(source: str, results: dict[str, str]) -> Any | None:
+def prediction_form(question: Question, result: dict[str, Any] | None) -> Any | None:
     """Return the form of a prediction as a cell, or None if its result is not known."""
-    name, given = predict_call(source)
-    data = answer_data(name, results.get(name, ""), **given)
-    text = f"{name}, your prediction. You can make it in {_LINK}."
+    data = answer_data(question, result)
+    text = f"{question.name}, your prediction. You can make it in {_LINK}."
     return element("prediction", data, text) if data else None
 
 
-def answer_data(
-    name: str, printed: str, choices: Sequence[str] = (), unit: str = "", count: int = 1
-) -> dict[str, Any] | None:
+def answer_data(question: Question, result: dict[str, Any] | None) -> dict[str, Any] | None:
     """Return what a page needs to ask for a prediction and to judge it."""
-    result = _read_result(printed, choices, unit, count)
-    if result is None:
+    if result is None or not _fits(question, result["result"]):
         return None
     return {
-        "name": name, "unit": unit, "count": count, "choices": list(choices), "result": result,
-        "right": accepted(result, unit), "shown": printed,
+        "name": question.name, "unit": question.unit, "count": question.count,
+        "choices": list(question.choices), "result": result["result"],
+        "right": accepted(result["result"], question.unit), "shown": result["shown"],
     }  # fmt: skip
 
 
-def _read_result(printed: str, choices: Sequence[str], unit: str, count: int) -> Any:
-    """Return the result that a lesson prints, or None if it cannot be read."""
-    if choices:
-        return printed if printed in choices else None
-    texts = _NUMBER.findall(printed.removesuffix(unit))
-    if len(texts) != count:
-        return None
-    numbers = [float(text) if re.search("[.e]", text) or unit else int(text) for text in texts]
-    return numbers[0] if count == 1 else numbers
+def _fits(question: Question, result: Any) -> bool:
+    """Return whether a result is one of the choices, or has as many numbers as the question."""
+    if question.choices:
+        return result in question.choices
+    return result is not None and np.size(result) == question.count
 
 
 def exercise_form(exercise: Exercise) -> Any | None:
@@ -79,10 +67,9 @@ def exercise_form(exercise: Exercise) -> Any | None:
     if right.ndim > 1 or right.size > MAX_NUMBERS:
         return None
     cases = [{"right": _interval(right, judge.tolerance), "text": judge.praise}]
-    for hint, wrong in judge.mistakes.items():
-        value = np.asarray(wrong(), dtype=np.float64)
+    for _, wrong, text in judge.mistakes():
+        value = np.asarray(wrong, dtype=np.float64)
         if value.shape == right.shape:
-            text = judge.hints[hint]
             cases.append({"right": _interval(value, judge.tolerance), "text": text})
     if not judge.is_count:
         near, sign = max(NEAR_MISS, judge.tolerance), -right

@@ -6,7 +6,6 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,20 +16,20 @@ from floatbase._files import write_whole
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
 from floatbase.lessons.publish.contents import equation_ranges, title_of
-from floatbase.lessons.publish.live import folder as live_folder
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
-from floatbase.lessons.publish.site import lecture, mathml, recall, reference
+from floatbase.lessons.publish.site import lecture, recall, reference
 from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.live_robots import (
-    LESSON_ROBOTS,
     LIVE_FOLDER,
+    METADATA,
     add_robot,
     robot_script,
 )
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import NOTES_ANCHOR, add_links, anchor_of
-from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
+from floatbase.live import folder as live_folder
 
 SITE = Path("build/site")
 _ROOT = NOTEBOOKS.parent
@@ -38,9 +37,10 @@ DOCS = _ROOT / "docs"  # the texts of the site's own pages
 RUN_FOLDER = _ROOT / "build" / "site-run"  # lessons that were run
 # addresses in the repository, as the pages of docs link to them -> addresses in the site
 _MOVED = {
-    "../notebooks/": "lessons/",
-    "../benchmarks/": "benchmarks/",
-    "../CHANGELOG.md": "changelog.md",
+    "notebooks/": "lessons/",
+    "benchmarks/": "benchmarks/",
+    "examples/": "examples/",
+    "CHANGELOG.md": "changelog.md",
 }
 _NO_LIVE = "This build has no live robots, because npm could not install MuJoCo for JavaScript."
 _FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
@@ -50,7 +50,7 @@ _FUNCTIONS = re.compile(r"`([a-z_]+\.\w+(?:\.\w+)?)`")
 
 def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bool = False) -> Path:
     """Build the site."""
-    known = sorted(NOTEBOOKS.glob("*.ipynb"))
+    known = list(lesson_notebooks().values())
     shown = known if lessons is None else sorted(path.resolve() for path in lessons)
     for path in shown:
         if path not in known:
@@ -65,13 +65,10 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         source, built = Path(place) / "source", Path(place) / "site"
         pictures = Pictures(built / "_static")
         shutil.copytree(DOCS, source)
+        shutil.copytree(_ROOT / "examples", source / "examples")
         (source / "benchmarks").mkdir()
-        _write_lessons(
-            source,
-            dict(zip(shown, notebooks or map(read_notebook, shown), strict=True)),
-            pictures,
-            has_live,
-        )
+        ran = dict(zip(shown, notebooks or map(read_notebook, shown), strict=True))
+        _write_lessons(source, ran, pictures, has_live)
         _write_texts(source, shown, _first_picture(scene, pictures), has_live)
         _write_reference(source / "api")
         _run_sphinx(source, built)
@@ -79,9 +76,7 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         lecture.write_slides(built / "_static" / lecture.SLIDES, in_site=True)
         if has_live:
             live_folder.write(built / "_static" / LIVE_FOLDER)
-        questions = recall.write_script(shown, built / "_static")
-        pages = (page.read_text(encoding="utf-8") for page in built.rglob("*.html"))
-        mathml.write_font(chain(pages, questions), built / "_static" / mathml.FONT)
+        recall.write_script(shown, built / "_static")
         replace_site(built, folder)
     return folder / "index.html"
 
@@ -130,41 +125,29 @@ def _write_lessons(
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
         prepared = prepare_lesson(notebook, pictures, addresses)
-        number = path.name.split("_")[0]
-        if has_live and number in LESSON_ROBOTS:
-            add_robot(prepared, number)
+        robot = prepared.metadata.pop(METADATA, None)
+        if has_live and robot:
+            add_robot(prepared, robot)
         nbformat.write(prepared, source / "lessons" / path.name)
 
 
 def _first_picture(notebook: Any, pictures: Pictures) -> str:
     """Return the first picture of a notebook as HTML."""
-    data = next(
-        output.data for cell in notebook.cells for output in cell.outputs if "data" in output
-    )
-    placed = pictures.place(data)
-    image = (
-        f'<img alt="go2 steps after a push" src="data:image/png;base64,{data.get("image/png")}">'
-    )
-    return placed or image
+    outputs = (output for cell in notebook.cells for output in cell.outputs)
+    data = next(output.data for output in outputs if "data" in output)
+    image = f"data:image/png;base64,{data.get('image/png')}"
+    return pictures.place(data) or f'<img alt="go2 steps after a push" src="{image}">'
 
 
 def _toctrees(lessons: Sequence[Path]) -> str:
     """Write the list of lessons for the side bar."""
     listed = {"The course": [path for path in lessons if path.name[0].isdigit()]}
     listed["Appendices and more"] = [path for path in lessons if not path.name[0].isdigit()]
-    return "\n\n".join(
-        "\n".join(
-            [
-                "```{toctree}",
-                ":hidden:",
-                f":caption: {caption}",
-                "",
-                *(f"lessons/{path.stem}" for path in paths),
-                "```",
-            ]
-        )
-        for caption, paths in listed.items()
-    )
+    trees = []
+    for caption, paths in listed.items():
+        pages = "".join(f"lessons/{path.stem}\n" for path in paths)
+        trees.append(f"```{{toctree}}\n:hidden:\n:caption: {caption}\n\n{pages}```")
+    return "\n\n".join(trees)
 
 
 def _lesson_table(known: Iterable[Path]) -> str:
@@ -176,49 +159,34 @@ def _lesson_table(known: Iterable[Path]) -> str:
 
 def _write_texts(source: Path, lessons: Sequence[Path], scene: str, has_live: bool) -> None:
     """Write all pages that are not lessons, with their links, and copy the benchmark figures."""
-    script, missing = ("", f"\n<p>{_NO_LIVE}</p>\n")
-    if has_live:
-        script, missing = robot_script("_static/"), ""
+    live = robot_script("_static/") if has_live else f"\n<p>{_NO_LIVE}</p>\n"
     made = {
         "lessons/equations.md": _with_anchors(equations.table()),
         "lessons/conventions.md": conventions.page(),
         "lessons/how_to.md": (NOTEBOOKS / "how_to.md").read_text(encoding="utf-8"),
         "lecture.md": lecture.page(),
         "changelog.md": (_ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
-        **{
-            f"benchmarks/{path.name}": path.read_text(encoding="utf-8")
-            for path in _ROOT.glob("benchmarks/*.md")
-        },
     }
     for name, text in made.items():
         (source / name).write_text(text, encoding="utf-8")
+    for path in [*_ROOT.glob("benchmarks/*.md"), *_ROOT.glob("benchmarks/*.png")]:
+        shutil.copy(path, source / "benchmarks")
     for path in source.rglob("*.md"):
         text = path.read_text(encoding="utf-8")
         if path.parent == source:
             for there, here in _MOVED.items():
-                text = text.replace(f"({there}", f"({here}")
+                text = text.replace(f"(../{there}", f"({here}")
         for name, part in {
             "scene": scene,
             "lessons": _lesson_table(lessons),
             "toctrees": _toctrees(lessons),
-            "live script": script + missing,
+            "live script": live,
             "recall": recall.recall_box("_static/"),
         }.items():
             text = text.replace(f"{{{name}}}", part) if path.parent == source else text
-        way = (
-            ""
-            if path.parent.name == "lessons"
-            else "lessons/"
-            if path.parent == source
-            else "../lessons/"
-        )
-        path.write_text(
-            _front_matter(text)
-            + add_links(text, {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}),
-            encoding="utf-8",
-        )
-    for path in _ROOT.glob("benchmarks/*.png"):
-        shutil.copy(path, source / "benchmarks")
+        way = {source: "lessons/", source / "lessons": ""}.get(path.parent, "../lessons/")
+        addresses = {lesson.name.split("_")[0]: way + lesson.name for lesson in lessons}
+        path.write_text(_front_matter(text) + add_links(text, addresses), encoding="utf-8")
 
 
 def _front_matter(text: str) -> str:
@@ -243,29 +211,18 @@ def _with_anchors(page: str) -> str:
         address = known.get(f"floatbase.{match[1]}")
         return f"{{py:obj}}`{match[1]} <{address}>`" if address else match[0]
 
-    page = page.replace(
-        "## Notes of the course text", f"({NOTES_ANCHOR})=\n## Notes of the course text"
-    )
-    return _FUNCTIONS.sub(
-        link, _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page)
-    )
+    notes = "## Notes of the course text"
+    page = page.replace(notes, f"({NOTES_ANCHOR})=\n{notes}")
+    page = _HEADINGS.sub(lambda match: f"({anchor_of(match[1])})=\n{match[0]}", page)
+    return _FUNCTIONS.sub(link, page)
 
 
 def _run_sphinx(source: Path, folder: Path) -> None:
     """Run Sphinx; a warning is an error."""
     from sphinx.cmd.build import build_main
 
-    options = [
-        "-q",
-        "-W",
-        "--keep-going",
-        "-E",
-        "-j",
-        "2",
-        "-c",
-        str(Path(__file__).parent),  # of conf.py
-        "-d",
-        str(source / ".doctrees"),
-    ]
+    options = ["-q", "-W", "--keep-going", "-E", "-j", "2"]
+    options += ["-c", str(Path(__file__).parent)]  # of conf.py
+    options += ["-d", str(source / ".doctrees")]
     if build_main([*options, str(source), str(folder)]):
         raise FloatbaseError("Sphinx reported the problems above; the site is incomplete.")

@@ -1,64 +1,21 @@
-"""Live robots in the pages of the site: their script, and the robots of lessons."""
+"""Live robots in the pages of the site: their script, and the robots of lessons.
+
+The metadata "live_robot" of a notebook has the name of a robot, a text, and any other attribute of
+the element. The robot stands at the end of the lesson, or in place of the panel of the cell with
+the tag "live-robot".
+"""
 
 from __future__ import annotations
 
 import html
-from typing import Any, NamedTuple
+from typing import Any
 
 from nbformat.v4 import new_markdown_cell
 
 LIVE_FOLDER = "live"  # in the site's static files
+METADATA = "live_robot"  # of a notebook
+TAG = "live-robot"  # of a cell with a panel
 _HEIGHT = "26rem"
-
-
-class LessonRobot(NamedTuple):
-    """A live robot in a lesson."""
-
-    name: str
-    attributes: dict[str, str]
-    text: str
-    panel_call: str = ""
-
-
-# number of a lesson -> its live robot. Only lesson 00 has a push panel with the page's controller
-LESSON_ROBOTS = {
-    "00": LessonRobot(
-        "go2", {}, "Once the robot is live, drag it where you like.", panel_call="push_panel("
-    ),
-    "05": LessonRobot(
-        "go2",
-        {"panel": "1"},
-        "Push the centre of mass. *push-recovery map* computes the largest push that go2 survives "
-        "in each direction. Open *where it stands*, move the centre of mass, and compute the map "
-        "again.",
-    ),
-    "06": LessonRobot(
-        "go2",
-        {"panel": "1", "mu": "0.3"},
-        "The friction coefficient is 0.3, so a moderate push brings forces to the facets of their "
-        "cones. Open *ground and load*, and let the controller assume more friction than there is.",
-    ),
-    "07": LessonRobot(
-        "go2",
-        {"panel": "1"},
-        "Open *constraints*, and read the multipliers of the active constraints while you push. "
-        "Open *gravity and motors*, and lower the torque limits until one becomes active.",
-    ),
-    "09": LessonRobot(
-        "talos",
-        {"panel": "1"},
-        "Talos stands on two flat feet, with four forces at each. Push it, and see which corners "
-        "of its feet lose their force first.",
-    ),
-    "P": LessonRobot(
-        "go2",
-        {"panel": "1"},
-        "Open *terms of eq. (7)*, and switch off gravity in the model. The robot sags, because "
-        "only its position error makes the controller push up. Stand the robot up, and switch "
-        "gravity off in reality instead. The page has only those switches of the playground that "
-        "keep the form of the controller's QP.",
-    ),
-}  # fmt: skip
 
 
 def robot_script(static: str) -> str:
@@ -66,9 +23,8 @@ def robot_script(static: str) -> str:
     return f'<script src="{static}{LIVE_FOLDER}/floatbase-live.js"></script>'
 
 
-def robot_element(robot: LessonRobot, instead: str = "") -> str:
+def robot_element(attributes: dict[str, str], instead: str = "") -> str:
     """Return the element of a live robot."""
-    attributes = {"name": robot.name} | robot.attributes
     written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
     style = f"display: block; margin: 1rem 0; {'min-' if instead else ''}height: {_HEIGHT}"
     words = "A live robot appears here in a browser with WebAssembly, if the page is on a server."
@@ -76,20 +32,20 @@ def robot_element(robot: LessonRobot, instead: str = "") -> str:
     return f'<floatbase-robot {written} style="{style}">{shown}</floatbase-robot>'
 
 
-def add_robot(notebook: Any, number: str) -> None:
+def add_robot(notebook: Any, robot: dict[str, str]) -> None:
     """Add the live robot of a lesson, in place: over its push panel, or at its end."""
-    robot = LESSON_ROBOTS[number]
-    if robot.panel_call:
-        (cell,) = (cell for cell in notebook.cells if robot.panel_call in cell.source)
-        pages = [data for each in cell.outputs if "text/html" in (data := each.get("data", {}))]
-        if pages:  # stored outputs have no pictures
-            element = robot_element(robot, pages[0]["text/html"])
-            script = robot_script("../_static/")
-            pages[0]["text/html"] = f"{script}\n{element}\n<p>{robot.text}</p>"
+    attributes, script = dict(robot), robot_script("../_static/")
+    about = attributes.pop("text")
+    panels = [cell for cell in notebook.cells if TAG in cell.metadata.get("tags", [])]
+    outputs = [output.get("data", {}) for cell in panels for output in cell.outputs]
+    for data in outputs:
+        if "text/html" in data:  # stored outputs have no pictures
+            element = robot_element(attributes, data["text/html"])
+            data["text/html"] = f"{script}\n{element}\n<p>{about}</p>"
             return
-    raw = f"{robot_script('../_static/')}\n{robot_element(robot)}"
+    raw = f"{script}\n{robot_element(attributes)}"
     text = (
-        f"## Live: push {robot.name}\n\n{robot.text}\n\n```{{raw}} html\n{raw}\n```\n\n"
+        f"## Live: push {attributes['name']}\n\n{about}\n\n```{{raw}} html\n{raw}\n```\n\n"
         "[All controls and robots](../live.md)"
     )
     notebook.cells.append(new_markdown_cell(text))

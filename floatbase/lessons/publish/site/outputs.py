@@ -15,17 +15,18 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 
 import floatbase
 from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.predictions import RESULT_MIME
 from floatbase.lessons.publish.notebooks import execute_notebook, read_notebook
 from floatbase.lessons.publish.site.answers import (
     as_markdown,
     exercise_form,
     prediction_form,
-    printed_results,
+    results,
     review_element,
 )
 from floatbase.lessons.publish.site.recall import recall_box
 from floatbase.lessons.publish.site.references import add_links
-from floatbase.lessons.questions import predict_call
+from floatbase.lessons.questions import all_questions
 
 RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
@@ -36,9 +37,8 @@ _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _CHECKED = re.compile(r'check\("(\w+\.\w+)"')
 _HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
-_LEARNER_CALLS = re.compile(
-    r"^(?:review|show_progress|reveal)\(", re.MULTILINE
-)  # their output is about the learner
+# their output is about the learner
+_LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)
 
 
 class PicturePlacer(Protocol):
@@ -83,7 +83,7 @@ def _digest_of_package() -> bytes:
         path
         for path in sorted(package.rglob("*.*"))
         if not {"publish", "node_modules"} & set(path.relative_to(package).parts)
-        and path.suffix in (".py", ".json", ".js", ".html")
+        and path.suffix in (".py", ".json", ".toml", ".js", ".html")
     )
     return b"".join(path.read_bytes() for path in files)
 
@@ -95,13 +95,13 @@ def _digest(data: bytes) -> str:
 def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
     """Prepare a lesson for Sphinx, in place."""
     about, heading = _description(notebook), ""
-    results = printed_results(cell for cell in notebook.cells if cell.cell_type == "code")
+    shown = results(notebook.cells)
     for i, cell in enumerate(notebook.cells):
         if cell.cell_type == "markdown":
             heading = (_HEADING.findall(cell.source) or [heading])[-1]
             cell.source = add_links(cell.source, lessons)
         else:
-            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures, results)
+            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures, shown)
     notebook.metadata.pop("widgets", None)  # widgets need a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
@@ -115,12 +115,14 @@ def _description(notebook: Any) -> str:
 
 
 def _prepare_code_cell(
-    cell: Any, heading: str, pictures: PicturePlacer, results: dict[str, str]
+    cell: Any, heading: str, pictures: PicturePlacer, shown: dict[str, Any]
 ) -> Any:
     tags = cell.metadata.get("tags", [])
-    if "predict" in tags:
-        form = prediction_form(cell.source, results)
-        return form or new_markdown_cell(_prediction_question(cell))
+    if name := cell.metadata.get("prediction"):
+        question = all_questions()[name]
+        form = prediction_form(question, shown.get(name))
+        asked = f"**{name}**, your prediction: {question.form}. You can make it in the live lesson"
+        return form or new_markdown_cell(_live_lesson_note(asked))
     if "check" in tags:
         checked = all_exercises().get(_CHECKED.findall(cell.source)[0])
         if checked and (form := exercise_form(checked)):
@@ -140,30 +142,13 @@ def _prepare_code_cell(
             "code_prompt_show": _CLAIMS_PROMPT,
             "code_prompt_hide": _CLAIMS_PROMPT,
         }
-    cell.outputs = [shown for output in cell.outputs for shown in _site_outputs(output, pictures)]
+    cell.outputs = [part for output in cell.outputs for part in _site_outputs(output, pictures)]
     _describe_figure(cell, heading)
     return cell
 
 
 def _live_lesson_note(text: str) -> str:
     return f":::{{div}} live\n{text}: [how to run it]({RUN_PAGE}).\n:::"
-
-
-def _prediction_question(cell: Any) -> str:
-    """Describe the prediction that a cell asks for."""
-    name, given = predict_call(cell.source)
-    if "choices" in given:
-        wanted = " or ".join(f"*{choice}*" for choice in given["choices"])
-    else:
-        count, unit = given.get("count", 1), given.get("unit", "")
-        wanted = ("a number" if count == 1 else f"{count} numbers") + (
-            f", in {unit}" if unit else ""
-        )
-    asked = f"**{name}**, your prediction: {wanted}."
-    return (
-        f":::{{div}} live\n{asked} Make your prediction before you read on. You can type it in "
-        f"in [the live lesson]({RUN_PAGE}).\n:::"
-    )
 
 
 def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
@@ -173,6 +158,8 @@ def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
         return [output] if output.name == "stdout" else []
     if output.output_type == "error":
         return [output]
+    if RESULT_MIME in output.data:
+        return [new_output("stream", name="stdout", text=f"{output.data['text/plain']}\n")]
     placed = pictures.place(output.data)
     if placed is not None:
         return [new_output("display_data", {"text/html": placed})]

@@ -15,9 +15,9 @@ from typing import Any
 from floatbase._files import write_whole
 from floatbase.lessons import recalling
 from floatbase.lessons.publish.notebooks import read_notebook
-from floatbase.lessons.publish.site.answers import answer_data, element_html, printed_results
+from floatbase.lessons.publish.site.answers import answer_data, element_html, results
 from floatbase.lessons.publish.site.inline import inline_html
-from floatbase.lessons.publish.workspace import NOTEBOOKS
+from floatbase.lessons.publish.workspace import lesson_notebooks
 from floatbase.lessons.questions import Question, all_questions
 
 SCRIPT = "recall-questions.js"  # in the site's static files
@@ -27,16 +27,12 @@ _NOTE = "Questions from earlier lessons come back here and in the live lesson."
 def recall_data(lessons: Iterable[Path]) -> dict[str, Any]:
     """Return the questions that may be asked again, and the rule that decides when."""
     addresses = {path.name.split("_")[0]: f"lessons/{path.stem}.html" for path in lessons}
-    printed: dict[str, str] = {}
-    for path in NOTEBOOKS.glob("*.ipynb"):
-        cells = read_notebook(path).cells
-        printed |= printed_results(cell for cell in cells if cell.cell_type == "code")
+    found: dict[str, Any] = {}
+    for path in lesson_notebooks().values():
+        found |= results(read_notebook(path).cells)
     questions = {}
-    for name in recalling.RECALLED:
-        question = all_questions()[name]
-        data = answer_data(
-            name, printed[name], question.choices, question.unit, question.count
-        )  # fmt: skip
+    for name, question in all_questions().items():
+        data = answer_data(question, found.get(name)) if question.recall else None
         if data:
             questions[name] = data | _texts(question) | {"address": addresses.get(question.lesson)}
     return {"rule": rule(), "questions": questions}
@@ -69,10 +65,7 @@ def recall_box(static: str) -> str:
     return f'<script src="{static}{SCRIPT}"></script>\n{element_html("recall", {}, _NOTE)}'
 
 
-def write_script(lessons: Iterable[Path], folder: Path) -> list[str]:
-    """Write the script with the questions, and return their texts, which may have formulas."""
-    data = recall_data(lessons)
-    text = json.dumps(data, ensure_ascii=False, separators=(",", ":"))
+def write_script(lessons: Iterable[Path], folder: Path) -> None:
+    """Write the script with the questions."""
+    text = json.dumps(recall_data(lessons), ensure_ascii=False, separators=(",", ":"))
     write_whole(folder / SCRIPT, f"globalThis.floatbaseRecall = {text};\n".encode())
-    kinds = ("topic", "context", "text")
-    return [one[kind] for one in data["questions"].values() for kind in kinds]

@@ -1,7 +1,8 @@
 // The page with a live robot: `floatbaseRobot.open(config)`. The physics and the controller run in
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
-// config: as for the viewer, with `robots`, the names to choose from. The address may have
+// config: as for the viewer, with `robots`, the names to choose from, and `settings`, the words and
+// ranges of controls (floatbase/live/settings.json). The address may have
 // ?name=…&mu=…&push=…&gait=…&panel=0.
 
 import {element, make, showNotice} from "./dom.js";
@@ -22,7 +23,7 @@ const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
-  "ground and load": "model: what the controller assumes. reality: what the robot has.",
+  "model and reality": "model: what the controller assumes. reality: what the robot has.",
   "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
     "that term in the controller's model or in reality.",
 };
@@ -68,7 +69,7 @@ async function start(scene, worker, {config, given, name, sight}) {
 
 function live(scene, worker, send, {drawing, settings, robot}, {config, given, name, sight}) {
   const force = Number(given.get("push")) || 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
-  const push = {force, towards: 90, duration: 0.1};
+  const push = {force, towards: 90, duration: config.settings.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
@@ -93,7 +94,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   }
   const first = robot.gaits[given.get("gait")] ? given.get("gait") : null;
   const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    names: config.robots, name, walk,
+    rows: config.settings, names: config.robots, name, walk,
     open(other) {
       given.set("name", other);
       location.search = given;
@@ -215,7 +216,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   }
   function text(key, content) {
     scene.handle({type: "set_text", path: "", name: key, text: content,
-      section: key === "active" ? "constraints" : ""});
+      section: key === "active" ? config.settings.torque_limits.section : ""});
   }
 
   worker.onmessage = ({data}) => {

@@ -4,14 +4,14 @@ import {isKept, readHash, textOf, valueOf, writeHash} from "../src/address.js";
 
 const gait = {name: "gait", value: 0, choices: ["stand", "trot"], section: "walking"};
 const facets = {name: "facets", value: 4, min: 3, max: 16, section: "quadratic program"};
-const foot = {name: "stand on FL", value: true, section: "stance"};
+const foot = {name: "lift FL", value: false, section: "stance"};
 
 test("a value survives the way through the address", () => {
   for (const [command, value] of [[gait, 1], [facets, 7], [foot, false], [foot, true]]) {
     assert.equal(valueOf(command, textOf(command, value)), value);
   }
-  const hash = writeHash([["CoM x [m]", "-0.02"], ["a & b", "c=d"]]);
-  assert.deepEqual([...readHash(hash)], [["CoM x [m]", "-0.02"], ["a & b", "c=d"]]);
+  const hash = writeHash([["CoM x [cm]", "-2"], ["a & b", "c=d"]]);
+  assert.deepEqual([...readHash(hash)], [["CoM x [cm]", "-2"], ["a & b", "c=d"]]);
   assert.equal(writeHash([]), "");
   assert.equal(readHash("").size, 0);
 });

@@ -1,10 +1,11 @@
 import assert from "node:assert/strict";
+import {readFileSync} from "node:fs";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
 import {defaults} from "../src/engine/engine.js";
 import {setParameter} from "../src/engine/tick.js";
-import {controlsOf} from "../src/live/controls.js";
+import {controlsOf, labelOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
 import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
@@ -115,21 +116,49 @@ test("a sentence stays long enough to be read, and a more important one waits fo
   assert.deepEqual(said, ["nothing", "friction"]);
 });
 
+const rows = JSON.parse(readFileSync(
+  new URL("../../../live/settings.json", import.meta.url), "utf8"));
+
+test("a control has its name, its symbol and its unit", () => {
+  assert.equal(labelOf(rows.com_x), "CoM x [cm]");
+  assert.equal(labelOf(rows.friction), "friction μ");
+  assert.equal(labelOf(rows.facets), "facets");
+});
+
 test("controls begin at the settings of the engine and change what they name", () => {
-  const data = {weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {}, lifted: []};
+  const data = {weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}}, lifted: []};
   const settings = defaults(data), push = {force: 30, towards: 90, duration: 0.1};
   const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
-  const made = Object.fromEntries(controlsOf({...data, points}, settings, push, {
-    names: ["go2"], name: "go2", open() {}, walk() {},
-  }).map((control) => [control.command.name, control]));
+  const chosen = [];
+  const made = Object.fromEntries(controlsOf({...data, points, lifted: points.slice(0, 1)},
+    settings, push, {rows, names: ["go2"], name: "go2", open() {}, walk: (gait) => {
+      chosen.push(gait);
+    }}).map((control) => [control.command.name, control]));
   for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
     "actualHasGravity"], ["Coriolis model", "hasCoriolis"], ["Coriolis reality",
     "actualHasCoriolis"]]) {
     assert.equal(made[name].command.value, settings[key]);
     assert.deepEqual(made[name].change(false), {set: {[key]: false}});
   }
+  for (const [name, setting] of [["friction μ model", "mu"], ["friction μ reality", "actualMu"],
+    ["payload [kg] model", "payload"], ["gravity g [m/s²]", "gravity"]]) {
+    assert.equal(made[name].command.value, settings[setting]);
+  }
   assert.deepEqual(made["payload [kg] reality"].change(2), {set: {actualPayload: 2}});
-  assert.deepEqual(made["torque limits [%]"].change(50), {set: {torque: 0.5}});
+  for (const [name, setting] of [["torque limits [%]", "torque"], ["CoM x [cm]", "forward"],
+    ["CoM y [cm]", "left"], ["CoM z [cm]", "height"]]) {
+    const {command, change} = made[name], {value, min, max} = command;
+    assert.deepEqual(change(value), {set: {[setting]: settings[setting]}});
+    assert.deepEqual(change(min), {set: {[setting]: 0.01 * min}});
+    assert.ok(min < max);
+  }
+  made["push [N]"].change(55);
+  assert.equal(push.force, 55);
+  assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
+  assert.deepEqual(made.lift.change(1), {set: {lifted: points[0]}});
+  made.gait.change(1);
+  made.gait.change(0);
+  assert.deepEqual(chosen, ["trot", null]);
   const missing = made["foot without ground"];
   assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
   assert.deepEqual(missing.change(0), {set: {missing: []}});

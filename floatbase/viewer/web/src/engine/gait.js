@@ -1,4 +1,4 @@
-// When the feet of a gait stand and swing, as `Gait` in floatbase/behaviours/gait.py. A gait:
+// When the feet of a gait stand and swing, as `Gait` in floatbase/behaviours/walk/gait.py. A gait:
 // {offsets: {foot: fraction of the period}, period, swing, start, stop}, s; stop is Infinity in an
 // endless gait.
 

@@ -6,7 +6,7 @@ const ARGUMENTS = [
   ["q", 1], ["v", 1], ["inputs", 1], ["M", 2], ["h", 1], ["J", 2], ["Ag", 2], ["oMi", 2],
   ["sizes", 1], ["ints", 1], ["floats", 1], ["floatWork", 1], ["intWork", 1], ["result", 1],
 ];
-// those of `write_targets` in floatbase/behaviours/compiled_targets.py, after the time
+// those of `write_targets` in floatbase/behaviours/walk/compiled_targets.py, after the time
 const TARGET_ARGUMENTS = ["com", "comVelocity", "body", "pieces", "swings", "inputs"];
 const MOST_PIECES = 16, MOST_SWINGS = 4; // of a plan
 const INTEGERS = new Set(["sizes", "ints", "intWork"]);
@@ -36,7 +36,7 @@ function imports(module, memory) {
 }
 
 // The control step of a robot. module: the compiled WebAssembly module. robot: its data, see
-// floatbase/lessons/publish/live/robots.py. `views` are its inputs and outputs, to be filled and
+// floatbase/live/robots.py. `views` are its inputs and outputs, to be filled and
 // read in place; matrices are stored as in Pinocchio.
 export function createTick(module, robot) {
   let memory = null;

@@ -26,7 +26,7 @@ export function coneStatus([x, y, z], mu, least) {
   return z > 0 && across <= mu * z * (1 + 0.02) ? "inside" : "outside";
 }
 
-// scene: of the page. drawing: sizes and paths, see floatbase/lessons/publish/live/scenes.py.
+// scene: of the page. drawing: sizes and paths, see floatbase/live/scenes.py.
 export function createPainter(scene, drawing, robot) {
   const path = (item) => `/meshcat/${item}`;
   const place = (item, matrix) => scene.handle(

@@ -1,0 +1,3 @@
+"""Walking: gaits, footholds, plans, and `Walk`, which follows them."""
+
+__all__: list[str] = []  # its modules are imported by name

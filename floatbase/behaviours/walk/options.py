@@ -1,0 +1,214 @@
+"""Gains of a `Walk`, and checks of its other arguments."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from floatbase._validation import (
+    Array,
+    Value,
+    as_array,
+    as_callable,
+    as_instance,
+    as_number,
+    as_positive,
+    checked,
+    numeric_copy,
+    short_repr,
+)
+from floatbase.behaviours.terrain import Terrain, as_terrain
+from floatbase.behaviours.walk.gait import Gait, check_always_supported
+from floatbase.behaviours.walk.swing import Swing, SwingPath
+from floatbase.control import WholeBodyController
+from floatbase.dynamics import Contacts, FlatFootContact
+from floatbase.errors import InputError
+from floatbase.objectives import Task
+from floatbase.robots import State
+
+_DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
+_MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
+_MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
+
+
+def _as_gains(name: str, value: Any) -> tuple[float, float]:
+    """Return a pair (kp in 1/s², weight), checked."""
+    kp, weight = as_array(name, value, (2,)).tolist()
+    return (
+        as_positive(f"kp in {name}", kp, "1/s²"),
+        as_positive(f"weight in {name}", weight, allow_zero=True),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Gains(Value):
+    """Gains (kp, weight) of each kind of task of a `Walk`; all tasks are critically damped.
+
+    Parameters
+    ----------
+    com : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the task on the centre of mass.
+    base : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the task on the base's orientation.
+    swing : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the tasks on swinging feet.
+    posture : (float, float), optional
+        Stiffness kp [1/s²] and weight [-] of the posture task. The swinging legs of a small robot
+        need large joint accelerations, so a large weight disturbs the centre of mass.
+    """
+
+    com: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
+    base: tuple[float, float] = field(default=(100.0, 10.0), metadata=checked(_as_gains))
+    swing: tuple[float, float] = field(default=(900.0, 10.0), metadata=checked(_as_gains))
+    posture: tuple[float, float] = field(default=(100.0, 1e-3), metadata=checked(_as_gains))
+
+    @staticmethod
+    def for_contacts(contacts: Contacts) -> Gains:
+        """Return the default gains for point feet or for flat feet.
+
+        Parameters
+        ----------
+        contacts : Contacts
+            The robot's contacts.
+
+        Returns
+        -------
+        Gains
+            Gains for flat feet if any contact is a flat foot, otherwise for point feet.
+        """
+        flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
+        return (
+            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2))
+            if flat
+            else Gains()
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class WalkOptions:
+    """Options of a `Walk` that do not change; `Walk` describes them."""
+
+    clearance: float
+    reach: float
+    ramp: float
+    foothold: Callable[..., npt.ArrayLike]
+    adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None
+    modify_plan: Callable[[Any, State], Any] | None
+    swing: Callable[..., SwingPath]
+    ground: Terrain | None
+    tasks: tuple[Task, ...]
+    acceleration: Array
+    gains: Gains
+    controller: Mapping[str, Any]
+
+    @staticmethod
+    def checked(
+        contacts: Contacts,
+        *,
+        clearance: float,
+        reach: float | None,
+        ramp: float,
+        foothold: Callable[..., npt.ArrayLike],
+        adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None,
+        modify_plan: Callable[[Any, State], Any] | None,
+        swing: Callable[..., SwingPath] | None,
+        ground: Terrain | None,
+        tasks: Sequence[Task],
+        acceleration: tuple[float, float],
+        gains: Gains | None,
+        controller: Mapping[str, Any],
+    ) -> WalkOptions:
+        """Return the options after checking them; None stands for a default."""
+        limits = as_array("acceleration", acceleration, (2,)).tolist()
+        forwards, turning = (
+            as_positive("acceleration", limit, unit, maximum=_MAX_ACCELERATION)
+            for limit, unit in zip(limits, ("m/s²", "rad/s²"), strict=True)
+        )
+        if reach is None:
+            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
+        if adjustment is not None:
+            example = "adjustment(plan, path, com, com_velocity, t)"
+            as_callable("adjustment", adjustment, example)
+        if modify_plan is not None:
+            as_callable("modify_plan", modify_plan, "modify_plan(plan, state)")
+        if not isinstance(tasks, list | tuple):
+            raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
+        example = "swing(start, end, lift_off, touchdown, clearance)"
+        if gains is None:
+            gains = Gains.for_contacts(contacts)
+        return WalkOptions(
+            clearance=as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
+            reach=as_positive("reach", reach, "m", maximum=1.0),
+            ramp=as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
+            foothold=as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
+            adjustment=adjustment,
+            modify_plan=modify_plan,
+            swing=Swing if swing is None else as_callable("swing", swing, example),
+            ground=as_terrain("ground", ground),
+            tasks=tuple(tasks),
+            acceleration=np.array([forwards, forwards, turning]),
+            gains=as_instance("gains", gains, Gains),
+            controller=controller,
+        )
+
+
+def flat_foot_names(contacts: Contacts) -> set[str]:
+    """Return the names of the flat feet."""
+    return {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}
+
+
+def check_options(behaviour: str, options: Iterable[str]) -> None:
+    """Raise `InputError` for an option that `WholeBodyController` does not have."""
+    known = [
+        name
+        for name in inspect.signature(WholeBodyController).parameters
+        if name not in ("robot", "contacts", "tasks")
+    ]
+    for name in options:
+        if name not in known:
+            raise InputError(
+                f"{behaviour} has no option {name!r}. Besides its own options, it accepts those of "
+                f"WholeBodyController: {', '.join(known)}."
+            )
+
+
+def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:
+    """Return a gait after checking that its feet are contacts and that a foot always stands.
+
+    may_fly: whether all feet may be in the air.
+    """
+    for foot in as_instance("gait", gait, Gait, "Gait.trot(robot)").feet:
+        if foot not in contacts.names:
+            names = ", ".join(contacts.names) or "none"
+            raise InputError(
+                f"The gait lifts {foot}, which is not among the contacts: {names}. "
+                f"Contacts.feet(robot) returns all feet of a robot."
+            )
+    if len(gait.feet) == len(contacts) and not may_fly:
+        check_always_supported(gait)
+    return gait
+
+
+def as_velocity(velocity: npt.ArrayLike) -> Array:
+    """Return a desired velocity, (2,), checked."""
+    velocity = as_array("velocity", velocity, (2,), "m/s")
+    as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
+    return velocity
+
+
+def as_yaw_rate(yaw_rate: float) -> float:
+    """Return a desired yaw rate, checked."""
+    return as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
+
+
+def as_vector(name: str, values: npt.ArrayLike, size: int) -> Array:
+    """Return a copy of a vector, (size,), after checking its shape; the tick checks its numbers."""
+    vector = numeric_copy(values)
+    if vector is None or vector.shape != (size,):
+        return as_array(name, values, (size,))
+    return vector

@@ -1,0 +1,42 @@
+"""The settings that a learner can change, the same in the live page and in the playground.
+
+`settings.json` has one row for each: a setting has one name, unit and range wherever it appears.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+ROWS: dict[str, dict[str, Any]] = json.loads(
+    Path(__file__).with_name("settings.json").read_text(encoding="utf-8")
+)
+
+
+class Setting(NamedTuple):
+    """A setting: its words, its range in its own unit, and its first value."""
+
+    name: str
+    symbol: str = ""
+    unit: str = ""
+    section: str = ""  # of the panel
+    low: float = 0.0
+    high: float = 0.0  # of a push in robot weights, of a payload in robot masses
+    step: float = 0.0
+    first: float = 0.0
+    scale: float = 1.0  # SI units per unit
+
+    @property
+    def range(self) -> tuple[float, float, float]:
+        """Smallest and largest value, and step."""
+        return self.low, self.high, self.step
+
+    @property
+    def label(self) -> str:
+        """Text of the control, such as "CoM x [cm]"."""
+        unit = f"[{self.unit}]" if self.unit else ""
+        return " ".join(part for part in (self.name, self.symbol, unit) if part)
+
+
+SETTINGS = {key: Setting(**row) for key, row in ROWS.items()}

@@ -1,0 +1,20 @@
+"""Damping that the motors apply when the controller is off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from floatbase._validation import Array
+from floatbase.robots import State
+
+# s: time constant with which the damping stops a joint if nothing else moves it
+_TIME_CONSTANT = 0.05
+
+
+def joint_damping(state: State, period: float) -> Array:
+    """Return the damping that each motor applies, shape (d,) [N·m·s/rad].
+
+    The damping is the joint's effective inertia in this state, 1 / (M⁻¹)ᵢᵢ, divided by 0.05 s.
+    """
+    inverse_inertia = np.diag(np.linalg.inv(state.M))[state.robot.nv - state.robot.d :]
+    return np.array(1.0 / (max(_TIME_CONSTANT, 2.0 * period) * inverse_inertia))

@@ -1,0 +1,145 @@
+"""The programs in examples/ run, and wbc.py computes what the library computes."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import json
+import re
+import runpy
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import SimpleNamespace
+
+import judges
+import loky
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import floatbase as fb
+
+ROOT = Path(__file__).resolve().parent.parent
+EXAMPLES = ROOT / "examples"
+WBC = EXAMPLES / "wbc.py"
+MAX_LINES = {"wbc.py": 350, "custom_terms.py": 60, "push_recovery_map.py": 60, "walk.py": 60}
+TORQUE = 1e-6  # of each motor's limit
+LIBRARIES = {"daqp", "example_robot_data", "mujoco", "numpy", "pinocchio"}
+
+
+@pytest.fixture(scope="module")
+def wbc():
+    """Run wbc.py as a script, and return its names and what it prints."""
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        names = runpy.run_path(str(WBC), run_name="__main__")
+    return SimpleNamespace(**names, printed=printed.getvalue())
+
+
+def run(name, **settings):
+    """Call the main function of an example."""
+    runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**settings)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
+def test_examples_are_short(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_LINES[path.name]
+
+
+def test_wbc_computes_the_torques_of_the_library(wbc):
+    robot = judges.load("go2")
+    controller = fb.WholeBodyController(
+        robot,
+        fb.Contacts.points(robot, mu=wbc.MU),
+        fb.standing_tasks(robot.standing().replace(q=wbc.Q_GOAL)),
+        joint_limits=None,
+        backend="reference",
+    )
+    rng, active = np.random.default_rng(0), set()
+    for speed in np.repeat([0.0, 0.3, 1.0], 10):  # m/s and rad/s
+        q = pin.integrate(robot.model, wbc.Q_GOAL, rng.uniform(-0.1, 0.1, robot.nv))
+        v = speed * rng.uniform(-1.0, 1.0, robot.nv)
+        command = controller(q, v)
+        _, tau, _ = wbc.control(q, v)
+        assert np.all(np.abs(tau - command.tau) <= TORQUE * robot.torque_limits)
+        active |= {label.kind for label in command.active}
+    assert {"friction", "lower torque limit", "upper torque limit"} <= active
+
+
+def test_wbc_stands_like_the_library(wbc):
+    robot = judges.load("go2")
+    state = robot.standing()
+    assert np.allclose(wbc.Q_GOAL, state.q, atol=1e-12)
+    assert np.allclose(wbc.COM_GOAL, state.com, atol=1e-12)
+    assert robot.feet[0].radius == wbc.RADIUS
+
+
+def test_wbc_reads_states_of_mujoco_in_the_convention_of_pinocchio(wbc):
+    robot = judges.load("go2")
+    rng = np.random.default_rng(0)
+    q = pin.integrate(robot.model, wbc.Q_GOAL, rng.uniform(-1.0, 1.0, robot.nv))
+    state = fb.State(robot, q, rng.uniform(-1.0, 1.0, robot.nv))
+    sim = fb.Simulation(robot)
+    sim.reset(state)
+    q, v = wbc.read_state(sim.data)
+    assert np.allclose(q, state.q, atol=1e-12) and np.allclose(v, state.v, atol=1e-12)
+
+
+def test_wbc_imports_only_the_libraries_that_it_names():
+    tree = ast.parse(WBC.read_text(encoding="utf-8"))
+    imported = {
+        name.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in node.names
+    }
+    assert imported == LIBRARIES
+
+
+def test_wbc_checks_each_equation_and_its_robot_returns_after_the_push(wbc):
+    checks, path = wbc.printed.split("\n\n")
+    assert {f"({n})" for n in (9, 11, 14, 15, 18, 20, 21, 26, 27)} <= set(
+        re.findall(r"\(\d+\)", checks)
+    )
+    left = [int(mm) for mm in re.findall(r"\d s +(-?\d+) mm", path)]
+    assert max(left[:6]) == 0 and 20 < max(left) < 30 and left[-1] == 0
+
+
+def test_lesson_07_shows_the_last_line_of_wbc(wbc):
+    lesson = json.loads((ROOT / "notebooks/07_quadratic_program.ipynb").read_text(encoding="utf-8"))
+    (box,) = [text for cell in lesson["cells"] if "wbc.py" in (text := "".join(cell["source"]))]
+    assert wbc.printed.splitlines()[-1] in box
+
+
+def test_the_first_ten_lines_of_the_readme_name_wbc():
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert any("(examples/wbc.py)" in line for line in lines[:10])
+
+
+def test_the_walk_example_goes_forwards_turns_and_stops(tmp_path, capsys):
+    run("walk", duration=1.0, page=tmp_path / "walk.html")
+    x, y = np.array(
+        re.findall(r"completed, at x = (.*) m, y = (.*) m", capsys.readouterr().out), dtype=float
+    ).T
+    assert x[0] > 0.1 and x[1] > x[0] + 0.1 and abs(x[2] - x[1]) < 0.05
+    assert abs(y[0]) < 0.01 < y[1]
+    assert (tmp_path / "walk.html").stat().st_size > 100_000
+
+
+def test_the_custom_terms_of_the_example_limit_power_and_unload_a_foot(capsys):
+    run("custom_terms", duration=0.5, watts=10.0)
+    (power, load), (limited_power, chosen_load) = np.array(
+        re.findall(r"completed: .* ([\d.]+) W, (\d+) N", capsys.readouterr().out), dtype=float
+    )
+    assert power > 15.0 and limited_power <= 10.0
+    assert load > 40.0 and chosen_load == 20.0
+
+
+def test_the_push_recovery_example_prints_and_draws_a_map(tmp_path, capsys, monkeypatch):
+    # a thread instead of a process, which would take two seconds to import everything
+    monkeypatch.setattr(loky, "get_reusable_executor", lambda *_, **__: ThreadPoolExecutor(1))
+    picture = tmp_path / "map.png"
+    run("push_recovery_map", directions=3, resolution=100.0, workers=1, picture=picture)
+    printed = re.findall(r"(\d+)° +(\d+) N", capsys.readouterr().out)
+    assert printed == [("0", "100"), ("120", "200"), ("240", "200")]
+    assert picture.read_bytes().startswith(b"\x89PNG")
