@@ -25,8 +25,6 @@ from floatbase.dynamics import EquationsOfMotion, LinearConstraint
 
 BACKENDS = ("compiled", "reference")
 JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
-
-
 Rows = Iterator[list[object]]
 
 
