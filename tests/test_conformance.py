@@ -139,7 +139,7 @@ NOT_CALLED = """
     Command ConstraintLabel recording.Animation HydraulicState Item SliderPanel Term
     NumericJudge check compare hand_in import_answers predict recall reveal review
     Playground playground sweep read_sweep push_recovery
-    conflicting_constraints constraint_and_jacobian raibert_foothold TorqueCommand
+    conflicting_constraints constraint_and_jacobian raibert_foothold TorqueCommand State.unchecked
     recording.as_rollout recording.swing_feet_at
 """
 

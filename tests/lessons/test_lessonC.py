@@ -11,12 +11,14 @@ import pytest
 import floatbase as fb
 from floatbase.lessons import all_exercises, check, progress
 from floatbase.lessons.lessonC import (
+    PUZZLES,
     ActiveSetGame,
     LimitedActiveSet,
     SolverController,
     answer_or_default,
     beale_problem,
     braking_qp,
+    check_active_set,
     corner_table,
     hexagon_table,
     longest_step,
@@ -24,7 +26,6 @@ from floatbase.lessons.lessonC import (
     run_with_push,
     standing_controller,
 )
-from floatbase.lessons.lessonC.pictures import PUZZLES, check_active_set
 from floatbase.qp import active_set, solve
 
 # exercises ----------------------------------------------------------------------------------------

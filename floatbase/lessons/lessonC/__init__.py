@@ -16,7 +16,9 @@ from floatbase.lessons.lessonC.helpers import (
     table_top,
 )
 from floatbase.lessons.lessonC.pictures import (
+    PUZZLES,
     ActiveSetGame,
+    check_active_set,
     plot_problem,
     show_solver_path,
     show_table,
