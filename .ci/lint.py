@@ -1,8 +1,8 @@
-"""Check the files that no test runs: lock, container, hub, workflows, README, and the pages that
-the code writes.
+"""Check the files that no test runs: lock, container, hub, workflows, README, the pages that the
+code writes, and the size of the code.
 
-`python .ci/lint.py` prints what is wrong and exits with 1 if anything is. It builds nothing and
-needs no network.
+`python .ci/lint.py` prints the sizes and what is wrong, and exits with 1 if anything is. It builds
+nothing and needs no network.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterator
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -332,10 +333,52 @@ def _numbers(ranges: str) -> set[str]:
     return numbers | set(re.findall(r"App\. [ABC]", ranges))
 
 
+# largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
+BUDGETS = {
+    "library": 14480, "lessons": 12700, "viewer": 4100, "tests": 22000, "benchmarks": 2300,
+    "docstrings": 16000,
+}  # fmt: skip
+
+
+def sizes() -> Faults:
+    """No part of the code is larger than its budget. The sizes of all parts are printed."""
+    found: Counter[str] = Counter()
+    folders = "floatbase", "tests", "benchmarks", "examples", ".ci", "assets"
+    for path in (path for folder in folders for path in (ROOT / folder).rglob("*.py")):
+        top, *inner = path.relative_to(ROOT).parts[:-1]
+        if "node_modules" in inner:
+            continue
+        part = "library" if top == "floatbase" else top
+        if top == "floatbase" and inner and inner[0] in ("lessons", "viewer", "playground", "live"):
+            part = inner[0]
+        source = path.read_text(encoding="utf-8")
+        documented = _docstring_lines(source)
+        found["docstrings"] += len(documented)
+        found[part] += sum(
+            number not in documented and not re.fullmatch(r"\s*(#.*)?", line)
+            for number, line in enumerate(source.splitlines(), 1)
+        )
+    print("lines of code:", ", ".join(f"{part} {n:,}" for part, n in sorted(found.items())))
+    for part, most in BUDGETS.items():
+        if found[part] > most:
+            yield f"{part}: {found[part]:,} lines are more than the budget of {most:,}"
+
+
+def _docstring_lines(source: str) -> set[int]:
+    """The numbers of the lines of all docstrings of a module."""
+    lines: set[int] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
+            node
+        ):
+            lines.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
+    return lines
+
+
 CHECKS: tuple[Callable[[], Faults], ...]
 CHECKS = (
     lock, imports, private_names, version, container, pythons, scripts, hub, workflows, commands,
-    pages,
+    pages, sizes,
 )  # fmt: skip
 
 
