@@ -118,7 +118,7 @@ lock: | python
 web:
 	cd floatbase/viewer/web && npm ci --no-audit --no-fund && npm run lint && npm test && npm run build
 
-# floatbase/live/tick.wasm is committed, so wasm-ld is needed only after a change of control/tick
+# floatbase/live/tick.wasm is committed, so wasm-ld is needed only after a change to control/tick
 live: $(VENV)/ready-$(KEY)
 	$(BIN)/python -m floatbase.lessons.publish live
 

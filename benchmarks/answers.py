@@ -1,10 +1,10 @@
-"""Print a digest of the controller's answers, so that a change that must not move a number can be
-compared with its predecessor on the same machine.
+"""Print digests of the controller's answers, to check that a code change changes no number.
 
-    python benchmarks/answers.py > before.txt        and again after the change; then compare
+    python benchmarks/answers.py > before.txt        again after the change, and compare
 
-A digest covers every bit of the torques, accelerations and forces: of both backends for every robot
-of the catalogue and every stance, and of the records of rollouts, walks and a jump.
+Compare only digests from the same machine. The digests cover every bit of the torques,
+accelerations and forces from both backends, for every robot in the catalogue and every stance. They
+also cover the records of rollouts, walks and a jump.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
     python examples/custom_terms.py
 
-A quadruped moves up and down. A task of our own takes load off one foot. A constraint of our own
-limits the mechanical power of the motors. More is in docs/whole_body_controller.md.
+A quadruped moves up and down. A user-defined task takes load off one foot. A user-defined
+constraint limits the mechanical power of the motors. See docs/whole_body_controller.md.
 """
 
 import numpy as np

@@ -2,7 +2,7 @@
 
     python examples/push_recovery_map.py
 
-The program writes a polar plot. More is in docs/push_recovery.md.
+The program writes a polar plot. See docs/push_recovery.md.
 """
 
 import numpy as np

@@ -2,8 +2,7 @@
 
     python examples/walk.py
 
-The program writes a page with the animation, which any browser shows. More about walking is in
-docs/walking.md.
+The program writes a page with the animation, which any browser shows. See docs/walking.md.
 """
 
 from dataclasses import replace
@@ -19,7 +18,7 @@ def report(phase, run):
 
 
 def main(duration=3.0, page="walk.html"):
-    """Walk for three rollouts of `duration` seconds, and write the last but one to a page."""
+    """Walk for three rollouts of `duration` seconds, and write the second one to a page."""
     robot = fb.load("go2")
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.3))
     sim = fb.Simulation(robot)  # each rollout continues where the one before ended

@@ -2,7 +2,7 @@
 
 A quadruped stands on the ground. Nothing holds its base, so its motors can move the base only by
 making the ground push back. Every 2 ms, the program solves a small optimization problem for the
-twelve motor torques. MuJoCo simulates the robot. A push displaces it, and it returns.
+twelve motor torques. MuJoCo simulates the robot. A push displaces the robot, which then returns.
 
     pip install numpy pin daqp mujoco example-robot-data-loaders
     python examples/wbc.py
@@ -49,9 +49,9 @@ Q_GOAL[2] += RADIUS - min(data.oMf[model.getFrameId(foot)].translation[2] for fo
 # and h holds gravity, Coriolis and centrifugal forces. For any q̈ that we want, (1) gives torques.
 #
 # A floating base adds six rows without motors. The matrix S puts zeros into these rows, (3).
-# Instead of the bolts, there are contact forces. They enter through the Jacobian J of the contact
-# points, (4). A foot in contact does not move, so J v = 0. The time derivative of this condition is
-# J q̈ + J̇ v = 0, and linear in q̈, (5), (6). Together, these are the constrained equations of motion:
+# Contact forces replace the bolts. They enter through the Jacobian J of the contact points, (4). A
+# foot in contact does not move, so J v = 0. The time derivative of this condition is linear in q̈:
+# J q̈ + J̇ v = 0, (5), (6). Together, these are the constrained equations of motion:
 #
 #     M q̈ + h = S τ + Jᵀ λ
 #         J q̈ = b   with   b = -J̇ v                                                            (7)
@@ -75,8 +75,8 @@ def contact_points(q, v):
         J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
         a = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
         points.append(data.oMf[frame].translation + down)
-        jacobians.append(J[:3] - pin.skew(down) @ J[3:])  # of the velocity v + ω × down,
-        drifts.append(a.linear + np.cross(a.angular, down))  # whose derivative this is
+        jacobians.append(J[:3] - pin.skew(down) @ J[3:])  # Jacobian of v + ω × down
+        drifts.append(a.linear + np.cross(a.angular, down))  # its derivative if q̈ = 0
     return np.array(points), np.vstack(jacobians), np.concatenate(drifts)
 
 
@@ -157,7 +157,7 @@ def pullback(cost, A, a):
 # sum f_c = G_f λ, (20), and a moment τ_c = G_τ λ about the centre of mass, (21). These are six
 # numbers, but λ has twelve. In the other six directions, the feet press against each other.
 def centre_of_mass(q, v):
-    """Return its position, its velocity, its Jacobian (3, nv) and J̇ v (3,), in world axes."""
+    """Return the centre of mass, its velocity, Jacobian (3, nv) and J̇ v (3,), in world axes."""
     J = pin.jacobianCenterOfMass(model, data, q)
     pin.centerOfMass(model, data, q, v, np.zeros(nv))
     return data.com[0].copy(), data.vcom[0].copy(), J, data.acom[0].copy()
@@ -172,7 +172,7 @@ def wrench_matrices(q, v):
 # === 7. Friction ==================================================================================
 # The ground pushes and never pulls. Friction holds a foot as long as the tangential part of its
 # force is at most μ times the normal part, α_∥ ≤ μ α_⊥, (28). Such forces form a cone. A QP needs
-# linear inequalities, so we replace the cone by a pyramid with four sides inside it.
+# linear inequalities, so we replace the cone with a four-sided pyramid inside it.
 def friction_pyramid():
     """Return G (4, 3), where G f ≤ 0 says that a force f on level ground is in the pyramid."""
     slope = MU / np.sqrt(2)  # of the four sides, so that the four edges lie on the cone
@@ -183,7 +183,7 @@ def friction_pyramid():
 # A quadratic program (QP) finds the least costly motion among the possible ones:
 #
 #     minimize   ψ(q̈, τ, λ)                                                                    (26)
-#     such that  (7) holds, forces are in their pyramids, and torques are within the limits     (27)
+#     subject to (7), forces in their pyramids, and torques within their limits                 (27)
 #
 # The goal is to stand. Each error asks for the acceleration that a spring and a damper would cause.
 # Weights decide which error matters most: first the centre of mass and the orientation of the base,
@@ -277,7 +277,7 @@ def check_momentum(q, v, qdd, forces):
 
 # === 10. Simulation ===============================================================================
 # MuJoCo reads the same URDF file, but shares no code with the equations above. We replace all
-# meshes by one ball for each foot, so only the feet touch the ground. As in (7), the joints have no
+# meshes with one ball per foot, so only the feet touch the ground. As in (7), the joints have no
 # friction, damping or rotor inertia. Unlike in (7), the contacts are a little soft.
 
 TIMESTEP = 0.002  # of the simulation and of the controller [s]

@@ -116,7 +116,7 @@ def _restart_message(given: Sequence[str], requested_port: int, port: int) -> st
 
 
 def start_when_connected(page: Playground, ended: threading.Event) -> None:
-    """Start the robot once a page is connected, so that it has not fallen or paused before."""
+    """Start the robot when a page connects, so that the robot does not fall or pause earlier."""
     while not (page.view.window.n_pages or ended.wait(_POLL_INTERVAL)):
         pass
     if not ended.is_set():

@@ -28,7 +28,7 @@ def used() -> float:
 
 
 def piece_of_work() -> float:
-    """Return the processor time of some Python and some small matrices [s], about 0.1 s."""
+    """Return the processor time of some Python code with small matrices [s], about 0.1 s."""
     start = time.process_time()
     matrix = np.eye(30) + 1.0 / (1.0 + np.add.outer(np.arange(30.0), np.arange(30.0)))
     x = np.ones(30)
@@ -89,7 +89,7 @@ class Costs:
 
     def _expensive(self) -> list[str]:
         return [
-            f"{tier}: {seconds / self._unit():.0f} units are more than {TOLERANCE} times its budget"
+            f"{tier}: {seconds / self._unit():.0f} units, more than {TOLERANCE} times its budget"
             for tier, seconds in self._by_tier.items()
             if seconds > TOLERANCE * BUDGETS[tier] * self._unit()
         ]

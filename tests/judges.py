@@ -50,7 +50,7 @@ BALLS = tuple(name for name in FLOATING if name not in FLAT)
 
 
 def sampled(names: Iterable[str], *kept: str) -> list[object]:
-    """Names as parameters of a test, those that are not kept in `make test-all` only."""
+    """Return names as parameters of a test; names not in `kept` run in `make test-all` only."""
     later = pytest.mark.front_end
     return [name if name in kept else pytest.param(name, marks=later) for name in names]
 

@@ -1,7 +1,8 @@
 """Run lessons in processes forked from one that has imported everything and made one controller.
 
-The program reads a line of JSON for each lesson and answers with one: exit status, processor time.
-Each lesson has two processes, nbval's and its kernel's. Both are forked before they start a thread.
+For each lesson, the program reads a line of JSON, and writes a line with the exit status and the
+processor time. Each lesson has two processes, nbval's and its kernel's. Both are forked before they
+start a thread.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Run:
 
 
 class LessonRunner:
-    """Start the program below, and let it run lessons."""
+    """Starts the program below, which runs lessons."""
 
     def __init__(self, mark: str) -> None:
         self._process = subprocess.Popen(
@@ -88,7 +89,7 @@ class ForkedKernel:
         os.kill(self._process.pid, signal.SIGINT)
 
     def shutdown_kernel(self, *, now: bool) -> None:
-        """End the kernel at once, as nbval always asks."""
+        """End the kernel at once, as nbval always requests."""
         assert now
         self._process.kill()
         self._process.join()

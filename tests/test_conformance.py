@@ -1,8 +1,8 @@
 """All public functions and constructors, called with one wrong argument at a time.
 
-Only an error of the package is right: not another exception, a warning, or an answer. What is new
-in a package is tested without an entry here; right arguments come from `values`, by annotation and
-by name. What each kind of check refuses is tested once, with all of `WRONG`.
+A wrong argument must raise an error of the package, not another exception, a warning, or an answer.
+New functions are tested without an entry here. Right arguments come from `values`, by annotation
+and by name. What each kind of check refuses is tested once, with all of `WRONG`.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ CHECKS: dict[str, tuple[Callable[[Any], object], set[str]]] = {
 
 
 @pytest.mark.parametrize("check", CHECKS)
-def test_each_kind_of_check_refuses_what_is_no_such_thing(check):
+def test_each_kind_of_check_refuses_wrong_values(check):
     call, meant = CHECKS[check]
     answers = {label: answer(partial(call, wrong)) for label, wrong in WRONG.items()}
     assert {label: found for label, found in answers.items() if found and label not in meant} == {}
@@ -131,7 +131,7 @@ def right() -> dict[str, Any]:
     }  # fmt: skip
 
 
-# made only by the package; judge whatever a learner gives; have tests of their own, since they
+# made only by the package; judge whatever a learner gives; have their own tests, since they
 # start a page or processes; are called by packages with what they have checked
 NOT_CALLED = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition
@@ -243,7 +243,7 @@ def wrongs(callee: Callee, name: str) -> dict[str, Any]:
 
 
 def answer_of(callee: Callee, **wrong: Any) -> str | None:
-    """What is wrong with the answer to right arguments but for these, or None."""
+    """Return what is wrong with the answer if `wrong` replaces right arguments, or None."""
     right()["Simulation"].reset()
     arguments = rights_of(callee) | wrong
     positional = [

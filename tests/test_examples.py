@@ -96,7 +96,7 @@ def test_wbc_imports_only_the_libraries_that_it_names():
     assert imported == LIBRARIES
 
 
-def test_wbc_checks_each_equation_and_its_robot_returns_after_the_push(wbc):
+def test_wbc_checks_each_equation_and_the_robot_returns_after_the_push(wbc):
     checks, path = wbc.printed.split("\n\n")
     assert {f"({n})" for n in (9, 11, 14, 15, 18, 20, 21, 26, 27)} <= set(
         re.findall(r"\(\d+\)", checks)

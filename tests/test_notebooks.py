@@ -138,7 +138,7 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
     assert run.status == 0 and "passed" in run.printed, run.printed[-6000:]
     assert left_behind(lessons) == []
     print(f"{path.stem}: {run.seconds:.1f} s")
-    assert 0.2 < run.seconds < LIMIT  # a run that took nothing was not measured
+    assert 0.2 < run.seconds < LIMIT  # a run of zero seconds was not measured
     monkeypatch.setenv("FLOATBASE_HOME", str(home))
     names = [
         cell.metadata["prediction"] for cell in notebook.cells if "prediction" in cell.metadata
@@ -197,7 +197,7 @@ def test_an_exercise_without_an_answer_gets_its_own_verdict() -> None:
     ] == []
 
 
-def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path: Path) -> None:
+def test_run_and_store_keeps_the_output_and_does_not_count_as_a_try(tmp_path: Path) -> None:
     spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"

@@ -211,7 +211,7 @@ def test_packages_are_imported_by_their_public_names():
 
 @cache
 def public_names(package: str) -> list[str]:
-    """Return the names in `__all__`; without it, as in a lesson, those that `__init__` imports."""
+    """Return the names in `__all__` or, as in a lesson, the names that `__init__` imports."""
     listed = getattr(import_module(package), "__all__", None)
     if listed is None:
         path = file_of(package)

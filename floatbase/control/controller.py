@@ -217,7 +217,7 @@ class WholeBodyController:
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
         self._prepare(problem, _Settings(solver, backend, on_infeasible))
-        _ = self._softer_controllers  # made here, outside the loop, since that takes milliseconds
+        _ = self._softer_controllers  # made here, because this takes milliseconds
 
     def _prepare(self, problem: Problem, settings: _Settings, warm_up: bool = True) -> None:
         """Store a checked problem, and prepare the compiled controller if it supports the problem.

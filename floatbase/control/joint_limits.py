@@ -81,7 +81,7 @@ def _as_period(name: str, value: Any) -> float:
 
 
 def as_weight(name: str, value: Any) -> float | None:
-    """Return the weight of a soft constraint, or None for a hard one, checked."""
+    """Check and return the weight of a soft constraint, or None for a hard constraint."""
     return None if value is None else as_positive(name, value, maximum=_MAX_WEIGHT)
 
 
@@ -389,7 +389,7 @@ class JointLimits(Value):
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:
-    """Return the positions of the actuated joints, 0 for joints that turn without limits."""
+    """Return the positions of the actuated joints, with 0 for joints that turn without limits."""
     index = _position_indices(robot)
     return np.where(index >= 0, q[index], 0.0)
 

@@ -9,7 +9,7 @@ FILE = Path(__file__).with_name("assignment.json")  # only in packages without s
 
 
 def where_solutions_are(name: str) -> str:
-    """Return a sentence about the solution of an exercise that this package does not have."""
+    """Return a sentence that says where to get a solution that this package does not have."""
     try:
         found = json.loads(FILE.read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -28,7 +28,7 @@ TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
 @dataclass(frozen=True, eq=False)
 class OwnNumber:
-    """Number in an exercise that can be another one for each student."""
+    """Number in an exercise that can differ from student to student."""
 
     text: str
     values: Sequence[float]
@@ -171,7 +171,7 @@ def own_numbers(student: str) -> None:
 
 
 def student_id(given: Any) -> str:
-    """Check an id of a student and return it without spaces around it."""
+    """Check a student's id and return it without spaces around it."""
     text = as_string("id", given).strip()
     if not text or not text.isprintable() or len(text) > 80:
         raise InputError('id must be your id in the class, such as "s123456".')

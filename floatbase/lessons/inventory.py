@@ -23,7 +23,7 @@ _ENTRY = "inventory {}"  # in the progress file
 
 @dataclass(frozen=True)
 class InventoryQuestion:
-    """Question with four answers, and the mistakes of the course behind wrong ones, by letter."""
+    """Question with four answers, and the known mistakes behind the wrong answers, by letter."""
 
     concept: str
     text: str

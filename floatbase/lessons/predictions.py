@@ -227,7 +227,7 @@ def lesson_name(given: str) -> str:
 
 
 def _describe_prediction(known: dict[str, Any], result: Any, unit: str) -> str:
-    """Return what `compare` writes behind a result about the prediction."""
+    """Return what `compare` writes about the prediction after the result."""
     off = _describe_error(known["said"], result, unit)
     if known.get("sure") and not is_right(known["said"], result, unit):
         off = f"{off}, and you were sure" if off else "and you were sure"

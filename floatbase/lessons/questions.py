@@ -12,7 +12,7 @@ from typing import Any
 from floatbase.errors import InputError
 from floatbase.lessons.publish.workspace import lesson_notebooks
 
-# what the metadata "question" of a prediction's cell may contain, for use outside its lesson
+# what the metadata "question" of a prediction's cell may contain, for use outside the lesson
 _METADATA = {"context": str, "text": str, "reason": str, "recall": bool, "lecture": bool}
 
 
@@ -27,7 +27,7 @@ class Question:
     choices: tuple[str, ...] = ()
     unit: str = ""
     count: int = 1
-    reason: str = ""  # of the result, if the text of the lesson needs its pictures
+    reason: str = ""  # for the result, if the text of the lesson relies on pictures
     recall: bool = False  # whether it can be asked again without the lesson's pictures
     lecture: bool = False  # whether a class votes on it
 

@@ -1,4 +1,4 @@
-"""Texts of the course that are data: tables of TOML files, which no programmer needs to edit."""
+"""Texts of the course as data: tables in TOML files, which authors edit without programming."""
 
 from __future__ import annotations
 

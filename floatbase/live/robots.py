@@ -28,7 +28,7 @@ from floatbase.robots import Robot, State
 from floatbase.simulation import Simulation
 
 ROBOTS = ("go2", "solo12", "talos")
-MU = SETTINGS["friction"].first  # friction coefficient, assumed and actual, at first
+MU = SETTINGS["friction"].first  # initial friction coefficient, assumed and actual
 FACETS = (4, 8, 16)
 TIMESTEP = 1e-3  # s
 LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
@@ -138,7 +138,7 @@ def _standing_problem(robot: Robot, lifted: str | None, facets: int) -> dict[str
 
 
 def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]) -> dict[str, Any]:
-    """Return the problem arrays of a controller, and the places of what controls change."""
+    """Return the problem arrays of a controller, and the places of what the controls set."""
     compiled = _compiled(made)
     sizes, ints, floats = compiled.pack(made.problem)
     inputs = compiled.default_inputs
@@ -231,7 +231,7 @@ def _target_places(made: WholeBodyController) -> dict[str, Any]:
 
 
 def gaits(robot: Robot) -> dict[str, Gait]:
-    """Return the gaits of a robot in the page, by name, none if it has no four point feet."""
+    """Return the gaits of a robot in the page, by name; empty without four point feet."""
     if len(robot.feet) != 4:
         return {}
     return {

@@ -1,6 +1,6 @@
-"""The settings that a learner can change, the same in the live page and in the playground.
+"""The settings that a learner can change in the live page and in the playground.
 
-`settings.json` has one row for each: a setting has one name, unit and range wherever it appears.
+`settings.json` has one row for each setting. Name, unit and range are the same on both pages.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ ROWS: dict[str, dict[str, Any]] = json.loads(
 
 
 class Setting(NamedTuple):
-    """A setting: its words, its range in its own unit, and its first value."""
+    """A setting: its name, its range in its own unit, and its initial value."""
 
     name: str
     symbol: str = ""

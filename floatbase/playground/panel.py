@@ -223,7 +223,7 @@ class Panel:
         self._playground.set(**{attribute: off if on else (*off, term)}, leg=leg)
 
     def show_view_settings(self, speed: float) -> None:
-        """Show the push, the speed and the displayed terms at their controls."""
+        """Show the push, the speed and the displayed terms in their controls."""
         play = self._playground
         values: dict[str, Any] = {
             "speed": speed,
@@ -236,7 +236,7 @@ class Panel:
             play.view.set_control_value(name, value)
 
     def show_settings(self, settings: Settings) -> None:
-        """Show settings at the controls; only a robot with a floating base has these controls."""
+        """Show settings in the controls; only a robot with a floating base has these controls."""
         if not self._playground.robot.is_floating:
             return
         sliders = [*_PAIRED_SLIDERS, *_STANCE_SLIDERS, _NOD_SLIDER, *_QP_SLIDERS]

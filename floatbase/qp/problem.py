@@ -294,7 +294,7 @@ class QP(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InequalityQP(QP):
-    """A `QP` without equalities, made from another one, with given `row_norms`."""
+    """A `QP` without equalities, made from another `QP`, with given `row_norms`."""
 
     row_norms: Array = field(kw_only=True)
 

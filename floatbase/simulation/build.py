@@ -71,7 +71,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 
 
 def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
-    """Write the description from which `build_model` builds the model; same arguments."""
+    """Write the description from which `build_model` builds the model, from the same arguments."""
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

@@ -467,8 +467,8 @@ class Simulation:
         Returns
         -------
         dict
-            Values for JSON, named as in the page's JavaScript: MuJoCo's model as XML, where MuJoCo
-            keeps what the robot has in its own order, and the limits of `fallen`.
+            Values for JSON, named as in the page's JavaScript: MuJoCo's model as XML, the places
+            of the robot's joints and bodies in MuJoCo's arrays, and the limits of `fallen`.
         """
         robot, model, conversion = self.robot, self.model, self._conversion
         joints = [model.joint(name) for name in robot.joint_names]

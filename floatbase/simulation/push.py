@@ -85,7 +85,7 @@ class Push(Value):
         Raises
         ------
         InputError
-            If an argument is not a number or out of range.
+            If an argument is not a number, or is out of range.
 
         Examples
         --------

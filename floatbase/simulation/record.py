@@ -334,7 +334,7 @@ class Recorder:
         targets: tuple[Array, Mapping[str, slice]] | None = None,
         joint_limits: JointLimits | None = None,
     ) -> None:
-        """Complete a row."""
+        """Complete the row of a control step."""
         n = self._n
         if targets is not None:
             self._targets.append((n, *targets))

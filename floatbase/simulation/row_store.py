@@ -130,7 +130,7 @@ class RowStore:
 
 @contextmanager
 def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[None]:
-    """Raise `InputError` if the path is not one of a file, or if the body cannot use the file."""
+    """Raise `InputError` if the path does not name a file, or if the body cannot use the file."""
     if not isinstance(path, str | os.PathLike):
         raise InputError(
             f'{argument} must be a path, such as "rows.jsonl", not {short_repr(path)}.'
@@ -143,7 +143,7 @@ def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[N
         raise
     except BlockingIOError:
         raise InputError(
-            f"Another sweep is writing to {path}. Wait until it ends, or give another file."
+            f"Another sweep is writing to {path}. Wait until it ends, or pass another file."
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = getattr(error, "strerror", error)
@@ -151,7 +151,7 @@ def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[N
 
 
 def as_json_value(what: str, value: Any) -> Any:
-    """Convert a value to what JSON returns for it; raise `InputError` that names it as `what`."""
+    """Convert a value to what JSON returns for it; raise `InputError`, with its name `what`."""
     try:
         return json.loads(json.dumps(value, default=_from_numpy))
     except (TypeError, ValueError) as error:

@@ -190,7 +190,7 @@ def _grid_points(grid: Any) -> list[Row]:
 
 
 def _is_list(value: Any) -> bool:
-    """Return whether a value can be iterated, unlike an array of shape (), and is no string."""
+    """Return whether a value is iterable, unlike an array of shape (), and is not a string."""
     is_iterable = isinstance(value, Iterable) and getattr(value, "shape", None) != ()
     return is_iterable and not isinstance(value, str)
 

@@ -232,7 +232,7 @@ def test_a_gait_whose_offsets_differ_by_rounding_begins_with_all_feet_that_lift_
         assert next(len(step.stance) for step in stand.history if len(step.stance) < 4) == 2
 
 
-def test_it_stands_without_a_step_while_the_capture_point_is_inside():
+def test_stand_takes_no_step_while_the_capture_point_is_inside():
     robot = judges.load("go2")
     stand = Stand(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, swing=0.2))
     assert run(stand, 1.0, fb.Push([0.0, 40.0, 0.0], start=0.2)).outcome == "completed"

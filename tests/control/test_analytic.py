@@ -296,7 +296,7 @@ def pushed(controller: str, weights: float) -> fb.Rollout:
     return fb.rollout(fb.Simulation(robot), chosen, 1.0, pushes=[push], control_period=PERIOD)
 
 
-def test_it_withstands_a_light_push():
+def test_the_analytic_controller_withstands_a_light_push():
     run = pushed("analytic", 0.2)
     assert run.outcome == "completed"
     assert np.min(run.planned[:, 2::3]) > 1.0

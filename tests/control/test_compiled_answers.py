@@ -402,7 +402,7 @@ def test_the_backend_is_visible_and_can_be_chosen():
         assert controller.backend_reason
 
 
-def test_another_solver_takes_the_reference_backend_and_the_reason_names_it():
+def test_another_solver_uses_the_reference_backend_and_the_reason_names_the_solver():
     robot = judges.load("go2")
     contacts, tasks = judges.stance(robot), list(fb.standing_tasks(robot.standing()))
     controller = fb.WholeBodyController(robot, contacts, tasks, solver="cvxpy")

@@ -174,7 +174,7 @@ def test_bad_input_is_refused_by_name(case):
         (lambda: analytic(contacts=fb.Contacts.points(SOLO)), "go2", "FL_FOOT", "FL_foot"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case):
+def test_an_unknown_name_is_refused_with_similar_names(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 

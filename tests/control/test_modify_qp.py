@@ -50,7 +50,7 @@ def test_it_changes_the_problem_that_is_solved_and_no_other_is():
     assert all(np.array_equal(getattr(same, part), getattr(before, part)) for part in PARTS)
 
 
-def test_modify_qp_takes_the_reference_backend_and_the_reason_names_it():
+def test_modify_qp_uses_the_reference_backend_and_the_reason_names_modify_qp():
     state = GO2.standing()
     even = controller(modify_qp=with_even_knees)
     assert even.backend == "reference" and "modify_qp" in even.backend_reason

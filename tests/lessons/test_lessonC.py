@@ -31,7 +31,7 @@ from floatbase.qp import active_set, solve
 # exercises ----------------------------------------------------------------------------------------
 
 
-def test_stubs_with_functions_count_no_try(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_stubs_with_functions_are_not_tries(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
     for name in ("C.2", "C.3", "C.4"):
         made: dict[str, Any] = {}

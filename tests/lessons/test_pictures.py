@@ -289,7 +289,7 @@ def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path: Path) -> None:
     assert 'type="range"' in html and "aria-label" in html and "aria-valuetext" in html
 
 
-def test_the_playground_of_a_site_stands_still(go2: fb.Robot) -> None:
+def test_the_playground_on_a_site_is_a_still_picture(go2: fb.Robot) -> None:
     from floatbase.playground import playground
 
     field = playground("go2")
@@ -441,7 +441,7 @@ def test_a_sample_looks_the_same_after_any_other(page: Any) -> None:
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_recording_plays_on_request_and_rests_out_of_sight(
+def test_a_recording_plays_on_request_and_pauses_out_of_sight(
     page: Any,
 ) -> None:
     frame = inside(page, 1)

@@ -48,7 +48,7 @@ def test_a_question_is_read_from_the_text_above_its_cell(
     )  # fmt: skip
 
 
-def test_metadata_replace_the_text_of_a_question(
+def test_metadata_replaces_the_text_of_a_question(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (found,) = read(tmp_path, monkeypatch, context="A ball.", text="Which forces?").values()
@@ -56,7 +56,7 @@ def test_metadata_replace_the_text_of_a_question(
 
 
 @pytest.mark.parametrize("metadata", [{"recal": True}, {"recall": "yes"}, {"reason": 3}])
-def test_wrong_metadata_are_named(
+def test_wrong_metadata_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, metadata: dict[str, Any]
 ) -> None:
     with pytest.raises(InputError, match=rf"11\.a.*{next(iter(metadata))}"):

@@ -235,7 +235,7 @@ def test_learners_with_similar_names_can_hand_in_at_once(
 
 
 @pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
-def test_hand_in_refuses_a_folder_that_is_no_path(learner: Path, folder: Any) -> None:
+def test_hand_in_refuses_a_folder_that_is_not_a_path(learner: Path, folder: Any) -> None:
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):
         hand_in("Ada", folder)

@@ -158,7 +158,7 @@ def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) ->
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(
+def test_an_unedited_new_text_is_updated_and_not_restored_once_removed(
     mine: Path,
 ) -> None:
     write(mine / LESSON, "first = 'my answer'")

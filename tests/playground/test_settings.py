@@ -301,7 +301,7 @@ def test_an_ellipse_that_grows_keeps_its_phase() -> None:
 
 
 def shown_control(playground: Playground, key: str, column: str = "") -> dict[str, Any]:
-    """The command of a control; key: of the table of settings."""
+    """Return the command of a control; `key` is its key in the table of settings."""
     name = f"{SETTINGS[key].label} {column}".strip()
     command = playground.view.window.scene.command(("/", "set_control", name))
     assert command is not None, f"there is no control {name!r}"

@@ -177,7 +177,7 @@ def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
-def test_it_agrees_with_daqp_on_20_problems_of_a_robot_and_records_its_iterations(name):
+def test_the_solver_agrees_with_daqp_on_20_problems_of_a_robot_and_records_its_iterations(name):
     active, infeasible = "", 0
     for qp in controller_qps(name, 20, torque=0.3):
         try:

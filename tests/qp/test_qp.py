@@ -280,7 +280,7 @@ def test_problems_that_do_not_fit_together_are_refused(case):
     refused(call, InputError, *named)
 
 
-def test_unknown_names_are_refused_with_the_names_like_them():
+def test_unknown_names_are_refused_with_similar_names():
     with raises(UnknownNameError, "solver", "activeset", "active_set"):
         check_solver("activeset")
     with raises(UnknownNameError, "tabel", "table"):

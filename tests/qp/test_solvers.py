@@ -153,7 +153,7 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver, gap):
 
 
 @pytest.mark.parametrize("name", judges.KINDS[:3])
-def test_an_infeasible_controller_names_a_smallest_set_of_rows(name):
+def test_an_infeasible_controller_names_a_minimal_set_of_rows(name):
     """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says,
     never anything else.
     """

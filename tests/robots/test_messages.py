@@ -42,7 +42,7 @@ def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
         (lambda: GO2.frame_id("FL_fot"), "FL_fot", "FL_foot"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case):
+def test_an_unknown_name_is_refused_with_similar_names(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 

@@ -104,7 +104,7 @@ def test_a_robot_stands_at_the_requested_height(floating):
     assert np.allclose(judges.stance(floating).positions(state)[:, 2], 0.0, atol=1e-9)
 
 
-def test_a_robot_that_stands_low_keeps_its_joint_limits_or_names_those_that_prevent_it():
+def test_a_low_stance_keeps_the_joint_limits_or_the_error_names_the_limit():
     """Without limits go2 would lie there with its hips 0.07 rad beyond theirs, and talos squat by
     1.5 rad too much.
     """

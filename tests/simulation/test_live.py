@@ -58,7 +58,7 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run, slices):
 @pytest.mark.parametrize(
     "error", [ValueError("a slip of the pen"), np.linalg.LinAlgError("singular")]
 )
-def test_an_error_of_a_controller_is_reported_and_the_run_can_go_on_with_another(
+def test_an_error_in_a_controller_is_reported_and_the_run_can_go_on_with_another(
     run, slices, error
 ):
     def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:

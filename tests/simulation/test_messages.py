@@ -80,7 +80,7 @@ def test_bad_input_is_refused_by_name(case):
         (lambda: fb.rollout(SIM, limp, 1.0, [fb.Push(UP, frame="bse")]), "bse", "base"),
     ],
 )  # fmt: skip
-def test_an_unknown_name_is_refused_with_the_names_like_it(case):
+def test_an_unknown_name_is_refused_with_similar_names(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
 

@@ -35,7 +35,7 @@ def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
     assert not missing(capsys.readouterr().err, "port", 99999)
 
 
-def test_a_urdf_with_a_wrong_foot_or_path_is_a_message(tmp_path, capsys):
+def test_a_wrong_foot_or_path_of_a_urdf_is_reported(tmp_path, capsys):
     file = tmp_path / "mine.urdf"
     file.write_text(load("solo12").urdf)
     assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2

@@ -379,7 +379,7 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
-def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_has_gone(
+def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
     notebook, page, viewer, standing, how
 ):
     viewer.show(standing)

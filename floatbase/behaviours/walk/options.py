@@ -178,7 +178,7 @@ def check_options(behaviour: str, options: Iterable[str]) -> None:
 
 
 def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:
-    """Return a gait after checking that its feet are contacts and that a foot always stands.
+    """Return a gait after checking that its feet are contacts and that at least one foot stands.
 
     may_fly: whether all feet may be in the air.
     """
@@ -195,14 +195,14 @@ def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:
 
 
 def as_velocity(velocity: npt.ArrayLike) -> Array:
-    """Return a desired velocity, (2,), checked."""
+    """Check a desired velocity, shape (2,), and return it."""
     velocity = as_array("velocity", velocity, (2,), "m/s")
     as_number("speed", float(np.linalg.norm(velocity)), "m/s", maximum=_MAX_SPEED)
     return velocity
 
 
 def as_yaw_rate(yaw_rate: float) -> float:
-    """Return a desired yaw rate, checked."""
+    """Check a desired yaw rate and return it."""
     return as_number("yaw_rate", yaw_rate, "rad/s", -_MAX_SPEED, _MAX_SPEED)
 
 

@@ -1,4 +1,4 @@
-"""What the plans of a walk depend on, as data for the robot in a web page."""
+"""The settings that determine the plans of a walk, as data for the robot in a web page."""
 
 from __future__ import annotations
 

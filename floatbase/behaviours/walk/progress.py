@@ -17,7 +17,7 @@ _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot,
 
 
 class GaitClock:
-    """The gait in use: the requested gait without the lift-offs that had passed."""
+    """The gait in use: the requested gait without the lift-offs before its selection."""
 
     def __init__(self, requested: Gait, t: float):
         self._requested: Gait | None = requested  # None while feet come down before a change

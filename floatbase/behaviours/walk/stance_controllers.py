@@ -24,7 +24,7 @@ _JOINT_LIMIT_WEIGHT = 10.0
 
 
 class StanceControllers:
-    """Whole-body controllers of a walk, by the feet that stand."""
+    """Whole-body controllers of a walk, one for each set of standing feet."""
 
     def __init__(
         self, posture: WalkingPosture, options: WalkOptions, force_weight: float | None = None

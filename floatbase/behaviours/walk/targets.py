@@ -40,7 +40,7 @@ class BodyPose:
 
     @staticmethod
     def checked(height: float, pitch: float) -> BodyPose:
-        """Return a pose that a user requests, with height [m] and pitch [rad] checked."""
+        """Check a requested height [m] and pitch [rad], and return them as a pose."""
         return BodyPose(
             as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE),
             as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH),

@@ -457,7 +457,7 @@ class Walk:
         """
 
     def page_data(self) -> dict[str, Any]:
-        """Return the gait and what plans depend on, as data for the robot in a web page.
+        """Return the gait and the settings of plans, as data for the robot in a web page.
 
         Returns
         -------

@@ -33,7 +33,7 @@ def _actuation_of_solo8(belt: float = 1.0, torque: int = 1) -> Array:
 
 
 def _held_width() -> float:
-    """Return the width of the plate whose rear edge is where the force of the floor acts [m]."""
+    """Return the width [m] of the plate at whose rear edge the force of the floor acts."""
     state = _on_the_plate()
     wrench = (state.h - state.frame_jacobian("tool0")[:3].T @ np.array([-120.0, 0.0, 0.0]))[:6]
     about_the_floor = wrench[4] + state.point("base_link")[2] * wrench[0]

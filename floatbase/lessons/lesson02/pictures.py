@@ -128,7 +128,7 @@ def play_collapse_comparison(
         drawn = view.painter.picture(ours, com=False, ghost=theirs) | home
         for i, (a, b) in enumerate(zip(places, contacts.positions(ours), strict=True)):
             if np.linalg.norm(b - a) > 2e-3:
-                aside = np.array([0.0, 0.06 * np.sign(a[1]), 0.0])  # where it is seen
+                aside = np.array([0.0, 0.06 * np.sign(a[1]), 0.0])  # beside the legs, to be visible
                 drawn[f"way/{i}"] = props.rod_between(a + aside, b + aside, 0.006, colour)
         return drawn
 

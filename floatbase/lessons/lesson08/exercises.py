@@ -90,7 +90,7 @@ def shift_mistakes() -> list[Mistake]:
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
-    """Return anymal_kinova standing and three lengths [m]."""
+    """Return a standing state of anymal_kinova, and three distances from its centre of mass [m]."""
     state = fb.load("anymal_kinova").standing()
     x = fb.Contacts.points(state.robot).positions(state)[:, 0] - state.com[0]
     return state, float(state.com[2]), float(-x.min()), float(x.max())

@@ -125,7 +125,7 @@ def single_support_rows(record: Rollout, every: int = 5) -> dict[int, Array]:
 def corner_forces(
     state: fb.State, sole: fb.Contacts, wrench: npt.ArrayLike, facets: int = 4
 ) -> Array:
-    """Return the forces at the corners of a sole whose wrench is closest to a given one."""
+    """Return the forces at the corners of a sole whose wrench is closest to a given wrench."""
     cones = zip(sole.normals, sole.mus, strict=True)
     rows = block_diag(*(FrictionPolyhedron(n, mu, facets).face_matrix for n, mu in cones))
     G = grasp_matrix(sole.positions(state), state.point(sole.names[0]))

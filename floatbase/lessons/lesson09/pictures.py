@@ -201,7 +201,7 @@ def limit_kinds(rows: npt.ArrayLike) -> list[str]:
 
 
 def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
-    """Draw which centres of pressure along x and twists the sole allows at this force, as SVG."""
+    """Draw the centres of pressure along x and the twists that this force allows, as SVG."""
     half, most = 150.0, 60.0  # mm, N·m: the ends of the axes
     sx, sy = WIDE / (2 * half), HIGH / (2 * most)
     x = np.linspace(-half, half, _COLUMNS)

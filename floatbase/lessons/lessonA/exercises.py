@@ -37,14 +37,14 @@ def _force_on_the_walker() -> Array:
 
 
 def _walker(coriolis: float, inward: float) -> Array:
-    """Combine m 2 ω × ṗ and m ω × (ω × p)."""
+    """Add multiples of m 2 ω × ṗ and m ω × (ω × p)."""
     sideways = 2.0 * np.cross(PLATFORM_RATE, CHILD_VELOCITY)
     towards_axis = np.cross(PLATFORM_RATE, np.cross(PLATFORM_RATE, CHILD_POSITION))
     return np.asarray(CHILD_MASS * (coriolis * sideways + inward * towards_axis))
 
 
 def _pair(i: int = LIFT_JOINT, j: int = ELBOW_JOINT) -> Array:
-    """Compute the joint effect of two joints at 1 rad/s."""
+    """Compute the Coriolis part that two joints at 1 rad/s have together."""
     e = np.eye(6)
     return np.asarray(
         coriolis_matrix(arm_state(tuple(e[i]))) @ e[j]

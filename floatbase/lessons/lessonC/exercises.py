@@ -28,7 +28,7 @@ def slanted_table() -> QP:
 
 
 def _price() -> float:
-    """Compute the multiplier as the rate of the minimum when the constraint is relaxed."""
+    """Compute the multiplier as the rate at which relaxing the constraint changes the minimum."""
     qp = slanted_table()
     h = 1e-4
     low, high = (

@@ -188,7 +188,7 @@ def braking_qp() -> fb.QP:
 
 
 def answer_or_default(name: str, answer: Any, otherwise: Any) -> Any:
-    """Return the answer to an exercise if it is right, or else a default; print which one it is."""
+    """Return the answer to an exercise if it is right, or else a default, and print which one."""
     if all_exercises()[name].judge(answer).right:
         print(f"{name}: the lesson continues with your answer.")
         return answer

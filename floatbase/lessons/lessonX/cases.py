@@ -146,7 +146,7 @@ def record_box(
     pushes: tuple[fb.Push, ...] = (),
     seconds: float = SECONDS,
 ) -> BlackBox:
-    """Simulate go2 that twists with a fault, until it falls or the time [s] is over."""
+    """Simulate a twisting go2 with a fault, until it falls or the time [s] is over."""
     robot, fault = fb.load("go2"), injected_fault.kind
     mu = injected_fault.size if fault == "friction" else MU
     assumed = (

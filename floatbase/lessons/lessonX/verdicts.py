@@ -49,7 +49,7 @@ _RIGHT = Verdict(True, "")
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Number that is evidence."""
+    """Number that serves as evidence."""
 
     right: float
     off: float

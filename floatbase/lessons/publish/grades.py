@@ -134,7 +134,7 @@ def grade_files(
     before: datetime | None = None,
     own_numbers: bool = False,
 ) -> tuple[list[Submission], int]:
-    """Judge files in their order, and report those that `hand_in` did not write."""
+    """Judge files in their order, and report the files that `hand_in` did not write."""
     submissions, unread = [], 0
     for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:

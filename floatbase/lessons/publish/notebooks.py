@@ -58,7 +58,7 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
 
 
 def _merged_streams(outputs: list[Any]) -> list[Any]:
-    """Merge printed lines in a row, without what went to the error stream.
+    """Merge consecutive printed lines, without the error stream.
 
     A kernel sends lines in parts of any length, and its warnings are not about the lesson.
     """

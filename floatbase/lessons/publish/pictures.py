@@ -25,7 +25,7 @@ from floatbase.viewer.web import pages
 _MIN_SHARED_SIZE = 1500  # bytes of a command that pictures share; a smaller one each has itself
 _COMMON_FRACTION = 0.3  # of a robot's pictures
 _FOLDER = "pictures"  # beside pictures.js
-_DATA_KEYS = ("keys", "first", "stops", "notes", "together")  # the HTML has all else
+_DATA_KEYS = ("keys", "first", "stops", "notes", "together")  # the HTML has everything else
 _NO_SCRIPT_TEXT = "This turns and moves where JavaScript is on."
 
 

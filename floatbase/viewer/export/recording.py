@@ -39,7 +39,7 @@ _LINEAR, _DISCRETE = 2301, 2300  # three.js: linear and discrete interpolation
 
 @dataclass(frozen=True, eq=False)
 class Animation:
-    """Pictures in time."""
+    """A sequence of pictures in time."""
 
     first: Picture
     command: protocol.Update
@@ -145,7 +145,7 @@ def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.b
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:
-    """Find the swing feet at a row of a rollout: contacts that the controller does not use then."""
+    """Find the swing feet at a row of a rollout: contacts that the controller does not use."""
     return frozenset(rollout.contacts.names).difference(rollout.contacts_at(row).names)
 
 

@@ -490,7 +490,7 @@ def scale_bar(
     for end, x in (("/start", 0.0), ("/end", length)):
         where = start + np.array([x, 0.0, 0.0])
         picture[end] = Item(rod, transform(where, along, (2.2 * thick, 2.2 * thick, thick / 2)))
-    # beside the bar, which looks short when seen from its end, and hidden by the robot, as it is
+    # beside the bar, which looks short from its end; the robot can hide both
     text_at = start + np.array([length / 2, 0.17 * size, 0.03 * size])
     words = unit_shapes.label(f"{force:g} N", 0.055 * size, True, colour, False)
     return picture | {"/label": Item(words, transform(text_at))}

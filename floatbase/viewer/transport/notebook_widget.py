@@ -133,7 +133,7 @@ class _OutputPages:
 
 
 class _WidgetChannel(Channel):
-    """The way to one page: messages that name the page, so that other pages ignore them."""
+    """The channel to one page: messages that name the page, so that other pages ignore them."""
 
     max_in_flight, min_interval = _MAX_IN_FLIGHT, FRAME_INTERVAL
     page: Connection

@@ -1,7 +1,7 @@
 """Live robots in the pages of the site: their script, and the robots of lessons.
 
 The metadata "live_robot" of a notebook has the name of a robot, a text, and any other attribute of
-the element. The robot stands at the end of the lesson, or in place of the panel of the cell with
+the element. The robot appears at the end of the lesson, or in place of the panel of the cell with
 the tag "live-robot".
 """
 
@@ -33,7 +33,7 @@ def robot_element(attributes: dict[str, str], instead: str = "") -> str:
 
 
 def add_robot(notebook: Any, robot: dict[str, str]) -> None:
-    """Add the live robot of a lesson, in place: over its push panel, or at its end."""
+    """Add the live robot to a lesson, in place of a panel or at the end."""
     attributes, script = dict(robot), robot_script("../_static/")
     about = attributes.pop("text")
     panels = [cell for cell in notebook.cells if TAG in cell.metadata.get("tags", [])]
