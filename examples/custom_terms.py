@@ -41,9 +41,12 @@ def main(duration=2.0, watts=10.0):
         return state.com + [0.0, 0.0, 0.03 * np.sin(4.0 * np.pi * t)]
 
     tasks = [fb.CoMTask(up_and_down), *fb.standing_tasks(state)[1:]]
-    for own_tasks, own_limits in ([], []), ([FootLoadTask("FL_foot", 20.0)], [power_limit(watts)]):
+    for extra_tasks, extra_limits in (
+        ([], []),
+        ([FootLoadTask("FL_foot", 20.0)], [power_limit(watts)]),
+    ):
         controller = fb.WholeBodyController(
-            robot, fb.Contacts.points(robot), [*tasks, *own_tasks], inequalities=own_limits
+            robot, fb.Contacts.points(robot), [*tasks, *extra_tasks], inequalities=extra_limits
         )
         run = fb.rollout(fb.Simulation(robot), controller, duration)
         power = np.sum(run.tau * run.v[:, 6:], axis=1).max()

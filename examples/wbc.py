@@ -8,8 +8,8 @@ motor torques. The robot stands in the simulator MuJoCo, is pushed away, and ret
     python examples/wbc.py
 
 Read from top to bottom. (7) means equation 7 of the course text *Controlling Floating-Based
-Robots*, and (k, nv) is a shape. The controller is in sections 2, 7 and 8. Sections 3 to 6 explain
-its equations, and section 9 tests them. Equations (19) and (22) to (25) are not used.
+Robots*, and (k, nv) is a shape. The controller in section 8 uses sections 2 and 4 to 7. Section 3
+and the pullback in section 5 explain it. Equations (19) and (22) to (25) are not used.
 
 Symbols: configuration q, velocity v (q̇ in the text), acceleration q̈ (`qdd`), joint torques τ
 (`tau`), and forces λ (`forces`) of the ground on the feet. SI units throughout.
@@ -68,7 +68,7 @@ def contact_points(q, v):
     pin.computeJointJacobians(model, data, q)
     pin.forwardKinematics(model, data, q, v, np.zeros(nv))  # with q̈ = 0, accelerations are J̇ v
     pin.updateFramePlacements(model, data)
-    down = np.array([0.0, 0.0, -RADIUS])  # to the lowest point, in world axes: no ω × down below
+    down = np.array([0.0, 0.0, -RADIUS])  # to the lowest point; constant in world axes
     points, jacobians, drifts = [], [], []
     for frame in map(model.getFrameId, FEET):
         J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
@@ -179,10 +179,10 @@ def friction_pyramid():
 #     minimize   ψ(q̈, τ, λ)                                                                    (26)
 #     subject to (7), forces in their pyramids, and torques within the limits                   (27)
 #
-# The goal is to stand. Each error asks for the acceleration that a spring and a damper would cause.
+# The goal is to stand. For each error, the desired acceleration is that of a spring and a damper.
 # Centre of mass and orientation use all six accelerations that four standing feet leave. The joint
-# angles matter only where limits prevent these. The small cost on τ and λ chooses one of the many λ
-# with the same q̈. We solve for the 42 entries of x; section 9 solves for the 12 entries of β.
+# angles have a small weight: they count if limits prevent the others. The cost on τ and λ chooses
+# one of the many λ with the same q̈. We solve for 42 entries of x; section 9 for 12 entries of β.
 
 COM_GOAL = centre_of_mass(Q_GOAL, np.zeros(nv))[0]
 KP, KD = 100.0, 20.0  # stiffness [1/s²] and damping [1/s]; 2 √KP is critical damping

@@ -80,7 +80,8 @@ class State(Value):
         robot : Robot
             The robot.
         q : ndarray, shape (nq,)
-            Configuration, float64 and finite; nothing may write to it later.
+            Configuration, float64 and finite, with unit quaternions and (cos, sin) pairs of unit
+            length; nothing may write to it later.
         v : ndarray, shape (nv,)
             Velocity, float64 and finite; nothing may write to it later.
 

@@ -42,7 +42,8 @@ def read_sweep(path: str | Path) -> DataFrame:
         If the file cannot be read or was not written by a sweep.
     """
     with _file_errors("path", path, "cannot be read", "Give the path of a sweep's file."):
-        return as_frame(_read_rows(path, Path(path).read_bytes()))
+        content = Path(path).read_bytes()
+    return as_frame(_read_rows(path, content))
 
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:

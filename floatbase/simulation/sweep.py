@@ -90,6 +90,8 @@ def sweep(
     InputError
         If the grid does not fit the function, if a result cannot be stored, or if the file belongs
         to another sweep or cannot be written to.
+    MissingDependencyError
+        If Dask is needed, but not installed.
     SimulationError
         If a process or the cluster breaks down. Rows in the file are kept, also after an interrupt.
 
@@ -140,10 +142,10 @@ def sweep(
             failed = 0
             with bar:
                 for i, answer in bar:
+                    store.add(i, json_points[i] | answer)
                     failed += answer["error"] is not None
                     if failed:
                         bar.set_postfix(failed=failed, refresh=False)
-                    store.add(i, json_points[i] | answer)
         return as_frame(store.rows)
 
 

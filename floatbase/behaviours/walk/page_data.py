@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 # names as in the page's JavaScript
 _CONSTANTS = {
     "timeTolerance": TIME_TOLERANCE,
-    "nPhases": plan._PLANNED_PHASES,
-    "horizon": plan._PLAN_HORIZON,
-    "settlingTime": plan._TOUCHDOWN_SETTLING_TIME,
+    "nPhases": plan.PLANNED_PHASES,
+    "horizon": plan.PLAN_HORIZON,
+    "settlingTime": plan.TOUCHDOWN_SETTLING_TIME,
     "shiftTime": plan.WEIGHT_SHIFT_TIME,
     "deadZone": plan.DCM_DEAD_ZONE,
-    "pathShift": plan._PATH_SHIFT_THRESHOLD,
+    "pathShift": plan.PATH_SHIFT_THRESHOLD,
     "sideFraction": MIN_SIDE_FRACTION,
 }
 

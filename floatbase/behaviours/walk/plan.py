@@ -31,11 +31,11 @@ from floatbase.errors import InputError
 from floatbase.robots import State
 
 Phase: TypeAlias = tuple[float, float, tuple[str, ...]]
-_PLANNED_PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
-_PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
+PLANNED_PHASES = 4  # stances that a plan looks ahead: two steps; eight are no better
+PLAN_HORIZON = 5.0  # s of standing that a plan looks ahead
 # s after touchdown until the height of a foot is used as that of the ground: earlier heights make
 # the planned footholds climb
-_TOUCHDOWN_SETTLING_TIME = 0.05
+TOUCHDOWN_SETTLING_TIME = 0.05
 # s before the first lift-off and after the last touchdown in which the ZMP shifts
 WEIGHT_SHIFT_TIME = 0.8
 # m of DCM error that a stance with area tolerates without moving a step: the error would grow by up
@@ -43,7 +43,7 @@ WEIGHT_SHIFT_TIME = 0.8
 DCM_DEAD_ZONE = 0.02
 # m: if steps were shifted by more, the path is shifted, too; otherwise the robot runs back to it
 # and falls
-_PATH_SHIFT_THRESHOLD = 0.05
+PATH_SHIFT_THRESHOLD = 0.05
 _MIN_STATIC_MARGIN = 0.03  # m from the edge of the support polygon at which the ZMP may stay
 _BISECTIONS = 10  # halvings of the way, so that the ZMP is known to 0.1 % of it
 LEVEL = Plane(frozen(np.zeros(2)), 0.0)
@@ -146,7 +146,7 @@ def next_footing(
     """
     feet, touchdowns = dict(plan.feet), dict(plan.footing.touchdowns)
     for foot in plan.stance:
-        if t > touchdowns.get(foot, -inf) + _TOUCHDOWN_SETTLING_TIME:
+        if t > touchdowns.get(foot, -inf) + TOUCHDOWN_SETTLING_TIME:
             feet[foot] = state.point(foot)
     offsets = []
     for foot in stance:
@@ -159,7 +159,7 @@ def next_footing(
     step_offset = np.mean(offsets, axis=0)
     # the mean of two steps, as swinging legs sway the body to both sides in turn
     mean_offset = (plan.footing.step_offset + step_offset) / 2.0
-    far = np.linalg.norm(mean_offset) > _PATH_SHIFT_THRESHOLD
+    far = np.linalg.norm(mean_offset) > PATH_SHIFT_THRESHOLD
     return Footing(feet, touchdowns, step_offset), mean_offset if far else np.zeros(2)
 
 
@@ -178,7 +178,7 @@ def make_plan(
 ) -> StepPlan:
     """Plan footholds, swings and the motion of the centre of mass."""
     t = path.time
-    phases = gait.phases(t, _PLANNED_PHASES, _PLAN_HORIZON)
+    phases = gait.phases(t, PLANNED_PHASES, PLAN_HORIZON)
     same = previous is not None and previous.stance == stance
     begin, until = previous.interval[0] if previous and same else t, phases[0][1]
     endless = len(phases) == 1  # it stands, with no end within the horizon

@@ -48,7 +48,7 @@ class StanceControllers:
     plan: StepPlan | None
 
     @property
-    def made(self) -> Mapping[tuple[str, ...], WholeBodyController]:
+    def by_feet(self) -> Mapping[tuple[str, ...], WholeBodyController]:
         """The controllers made so far, by stance."""
         return MappingProxyType(self._controllers)
 

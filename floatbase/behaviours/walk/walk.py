@@ -319,7 +319,7 @@ class Walk:
     @property
     def controllers(self) -> Mapping[tuple[str, ...], WholeBodyController]:
         """The controllers made so far, by the names of the feet that stand."""
-        return self._controllers.made
+        return self._controllers.by_feet
 
     @property
     def footholds(self) -> dict[str, Array]:

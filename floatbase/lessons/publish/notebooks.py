@@ -58,15 +58,10 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
 
 
 def _merged_streams(outputs: list[Any]) -> list[Any]:
-    """Merge consecutive printed lines, without the error stream.
-
-    A kernel sends lines in parts of any length, and its warnings are not about the lesson.
-    """
+    """Merge consecutive lines of each stream, which a kernel sends in parts of any length."""
     merged: list[Any] = []
     for output in outputs:
-        if output.output_type == "stream" and output.name == "stderr":
-            continue
-        if output.output_type == "stream" and merged and merged[-1].output_type == "stream":
+        if output.output_type == "stream" and merged and merged[-1].get("name") == output.name:
             merged[-1].text += output.text
         else:
             merged.append(output)
@@ -104,7 +99,9 @@ def run_and_store(path: Path) -> None:
         if cell.cell_type != "code":
             continue
         cell.metadata.pop("execution", None)  # times of day
-        if "picture" in cell.metadata.get("tags", []):
-            cell.outputs = []
+        # what went to the error stream is about this run, not the lesson
+        kept = [output for output in cell.outputs if output.get("name") != "stderr"]
+        is_picture = "picture" in cell.metadata.get("tags", [])
+        cell.outputs = [] if is_picture else _merged_streams(kept)
     notebook.metadata.pop("widgets", None)
     write_whole(path, f"{nbformat.writes(notebook)}\n".encode())

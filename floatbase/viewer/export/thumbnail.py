@@ -1,7 +1,7 @@
 """Images of pictures, drawn without a browser, for notebooks that are read without a kernel.
 
 An image resembles the page, but is simpler: it has one light, no gloss and no shadows, and lines
-always lie behind meshes. Triangles are drawn from far to near, which takes some tenths of a second.
+always lie behind meshes. Drawing takes some tenths of a second.
 """
 
 from __future__ import annotations
@@ -9,75 +9,53 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from floatbase._validation import Array
+from floatbase.viewer.export.rasteriser import (
+    NEAR_PLANE,
+    Camera,
+    Pixels,
+    draw_meshes,
+    unpacked,
+)
 from floatbase.viewer.scene.colours import BACKGROUNDS, RGB, hex_code
 from floatbase.viewer.scene.diff import ROOT
-from floatbase.viewer.scene.ground import LEVEL, DrawnGround, Plane, Planes, Terrain, displacement
+from floatbase.viewer.scene.ground import (
+    LEVEL,
+    DrawnGround,
+    Plane,
+    Planes,
+    Terrain,
+    displacement,
+)
 from floatbase.viewer.scene.label_image import FONT_SIZE, font
 from floatbase.viewer.scene.shapes import Item, Picture
 from floatbase.viewer.scene.store import Scene
-from floatbase.viewer.scene.threejs import TYPES
 
-_SUPERSAMPLING = 2  # pixels drawn per pixel of the image, in each direction
+SUPERSAMPLING = 2  # pixels drawn per pixel of the image, in each direction
 _ASPECT = 1.7  # width / height
 _SCALE = 0.8  # size of the image / size of the picture in the page
 _COLOURS = 256
-_NEAR_PLANE = 0.05  # m from the camera: anything nearer is not drawn
-_CORNERS, _DISTANCE, _COLOUR = slice(6), 6, slice(7, 10)  # columns of triangles in the image
-_AMBIENT, _DIFFUSE = 0.62, 0.42
-_LIGHT_DIRECTION = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
-
-
-class _Camera(NamedTuple):
-    """A perspective camera."""
-
-    eye: Array
-    target: Array
-    angle: float
-    size: tuple[int, int]
-
-    def project(self, points: Array) -> Array:
-        """Return the places of points in the image [pixels], and their distances [m]."""
-        forward = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        if np.linalg.norm(right) < 1e-9:
-            right = np.array([0.0, -1.0, 0.0])
-        right = right / np.linalg.norm(right)
-        seen = (points - self.eye) @ np.stack([right, np.cross(forward, right), forward], axis=1)
-        scale = self.pixels_at_one_metre / np.maximum(seen[..., 2:], _NEAR_PLANE)
-        return np.concatenate(
-            [seen[..., :2] * scale + 0.5 * np.array(self.size), seen[..., 2:]], -1
-        )
-
-    @property
-    def pixels_at_one_metre(self) -> float:
-        """Size in the image of a length of 1 m at a distance of 1 m [pixels]."""
-        return 0.5 * self.size[1] / float(np.tan(np.radians(self.angle) / 2))
 
 
 def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
     """Draw a picture as a PNG file, with its scene's camera, background, title and legend."""
-    size = (
-        _SUPERSAMPLING * round(_ASPECT * _SCALE * height),
-        _SUPERSAMPLING * round(_SCALE * height),
-    )
-    top, bottom, *_, text = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
-    image, camera = _gradient(size, top, bottom), _camera(picture, scene, size)
+    size = SUPERSAMPLING * round(_ASPECT * _SCALE * height), SUPERSAMPLING * round(_SCALE * height)
+    background = BACKGROUNDS[_setting(scene, "set_theme", {"name": "light"})["name"]]
+    canvas, camera = _background(size, background), _camera(picture, scene, size)
     kinds: dict[str, list[Item]] = {"LineSegments": [], "Mesh": [], "Sprite": []}
     for item in picture.values():
         kinds[item.shape.data["object"]["type"]].append(item)
-    _draw_lines(kinds["LineSegments"], camera, image)
-    for on_top in (False, True):
-        meshes = [item for item in kinds["Mesh"] if _material(item)["depthTest"] != on_top]
-        image = _with_meshes(meshes, camera, image)
+    _draw_lines(kinds["LineSegments"], camera, canvas)
+    draw_meshes(kinds["Mesh"], camera, canvas)
+    image = Image.fromarray(np.clip(255.0 * canvas + 0.5, 0, 255).astype(np.uint8))
     _draw_labels(kinds["Sprite"], camera, image)
-    _draw_caption(scene, text, image)
-    return _png_bytes(image.reduce(_SUPERSAMPLING))
+    _draw_caption(scene, background[3], image)
+    return _png_bytes(image.reduce(SUPERSAMPLING))
 
 
 def side_by_side(files: Sequence[bytes]) -> bytes:
@@ -117,7 +95,7 @@ def _setting(scene: Scene, kind: str, default: dict[str, Any]) -> dict[str, Any]
     return scene.command(("/", kind, "")) or default
 
 
-def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> _Camera:
+def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> Camera:
     """Return the camera, moved with what it follows, at a constant height above the ground."""
     set_to = _setting(
         scene, "set_camera", {"position": [2.0, 1.0, 0.0], "target": [0.0, 0.0, 0.0], "fov": 32.0}
@@ -130,7 +108,7 @@ def _camera(picture: Picture, scene: Scene, size: tuple[int, int]) -> _Camera:
         if item is None
         else displacement(_ground(scene), _from_threejs(follow["from"]), item.matrix[:3, 3])
     )
-    return _Camera(eye + gone, target + gone, set_to["fov"], size)
+    return Camera(eye + gone, target + gone, set_to["fov"], size)
 
 
 def _ground(scene: Scene) -> DrawnGround:
@@ -149,131 +127,67 @@ def _from_threejs(point: Sequence[float]) -> Array:
     return np.array([x, -z, y])
 
 
-def _gradient(size: tuple[int, int], top: RGB, bottom: RGB) -> Image.Image:
+def _background(size: tuple[int, int], background: tuple[RGB, ...]) -> Pixels:
     """Return an image of the background, a vertical gradient."""
-    down = np.linspace(0.0, 1.0, size[1])[:, None, None]
-    column = np.array(top) + down * (np.array(bottom) - np.array(top))
-    return Image.fromarray((255.0 * column).round().astype(np.uint8)).resize(size)
+    down = np.linspace(0.0, 1.0, size[1], dtype=np.float32)[:, None, None]
+    top, bottom = (np.array(colour, dtype=np.float32) for colour in background[:2])
+    return np.ascontiguousarray(np.broadcast_to(top + down * (bottom - top), (size[1], size[0], 3)))
 
 
-def _draw_lines(items: Sequence[Item], camera: _Camera, image: Image.Image) -> None:
+def _draw_lines(items: Sequence[Item], camera: Camera, canvas: Pixels) -> None:
     """Draw line segments."""
+    image = Image.fromarray((255.0 * canvas).astype(np.uint8))
     draw = ImageDraw.Draw(image)
     for item in items:
-        segments = camera.project(_vertices(item)).reshape(-1, 2, 3)
-        is_near = (np.abs(segments[:, :, :2]) < 4 * np.array(camera.size)).all(axis=(1, 2))
-        is_seen = is_near & (segments[:, :, 2] > _NEAR_PLANE).all(axis=1)
-        for ends in segments[is_seen, :, :2].reshape(-1, 4).tolist():
-            draw.line(ends, fill=f"#{_material(item)['color']:06x}", width=_SUPERSAMPLING)
+        points = unpacked(
+            item.shape.data["geometries"][0]["data"]["attributes"]["position"]
+        ).astype(np.float64)
+        seen = camera.project(points @ item.matrix[:3, :3].T + item.matrix[:3, 3]).reshape(-1, 6)
+        wide, high = camera.size
+        is_near = (np.abs(seen[:, [0, 3]]) < 4 * wide).all(axis=1) & (
+            np.abs(seen[:, [1, 4]]) < 4 * high
+        ).all(axis=1)
+        for x0, y0, _, x1, y1, _ in seen[
+            is_near & (seen[:, [2, 5]] > NEAR_PLANE).all(axis=1)
+        ].tolist():
+            draw.line(
+                (x0, y0, x1, y1),
+                fill=_hex_code(item.shape.data["materials"][0]["color"]),
+                width=SUPERSAMPLING,
+            )
+    canvas[:] = np.asarray(image, dtype=np.float32) / 255.0
 
 
-def _with_meshes(items: Sequence[Item], camera: _Camera, image: Image.Image) -> Image.Image:
-    """Return the image with meshes, drawn from far to near."""
-    opaque: list[Array] = [np.empty((0, 10))]
-    layers: list[tuple[float, Array, float]] = []
-    for item in items:
-        triangles, material = _triangles(item, camera), _material(item)
-        opacity = material["opacity"] if item.colour is None else item.colour[3]
-        if opacity >= 1.0:
-            opaque.append(triangles)
-        else:
-            # the far and the near half are one layer each, unless the front hides the back
-            parts = np.array_split(triangles, 1 if material["depthWrite"] else 2)
-            layers += [(part[:, _DISTANCE].mean(), part, opacity) for part in parts if len(part)]
-    rest = _from_far_to_near(np.concatenate(opaque))
-    for distance, layer, opacity in sorted(layers, key=lambda layer: -layer[0]):
-        is_behind = rest[:, _DISTANCE] > distance
-        _draw_triangles(rest[is_behind], image)
-        rest = rest[~is_behind]
-        covered = image.copy()
-        _draw_triangles(layer, covered)
-        image = Image.blend(image, covered, opacity)
-    _draw_triangles(rest, image)
-    return image
-
-
-def _draw_triangles(triangles: Array, image: Image.Image) -> None:
-    """Draw each triangle over what is already there."""
-    draw = ImageDraw.Draw(image)
-    colours = (255.0 * triangles[:, _COLOUR]).round().astype(int).tolist()
-    for corners, colour in zip(triangles[:, _CORNERS].tolist(), colours, strict=True):
-        draw.polygon(corners, fill=tuple(colour))
-
-
-def _from_far_to_near(triangles: Array) -> Array:
-    """Return triangles sorted by their distance."""
-    return triangles[np.argsort(-triangles[:, _DISTANCE], kind="stable")]
-
-
-def _triangles(item: Item, camera: _Camera) -> Array:
-    """Return the triangles of a mesh that are in the image, with lit colours, from far to near."""
-    data, material = item.shape.data["geometries"][0]["data"], _material(item)
-    faces = _unpacked(data["index"]).reshape(-1, 3).astype(np.int64)
-    points = _vertices(item)[faces]
-    colour = np.array([material["color"] >> shift & 255 for shift in (16, 8, 0)]) / 255.0
-    if item.colour is not None:
-        colour = np.array(item.colour[:3])
-    colours = np.broadcast_to(colour, (len(faces), 3))
-    if material["vertexColors"] and item.colour is None:
-        colours = colours * _unpacked(data["attributes"]["color"])[faces].mean(axis=1) / 255.0
-    if material["type"] == "MeshPhongMaterial":
-        normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        # both sides of a surface are lit
-        towards = np.sign(np.sum(normals * (camera.eye - points[:, 0]), axis=1))
-        light = _AMBIENT + _DIFFUSE * np.maximum(towards * (normals @ _LIGHT_DIRECTION), 0.0)
-        colours = np.minimum(colours * light[:, None], 1.0)
-    seen = camera.project(points)
-    corners, distances = seen[:, :, :2], seen[:, :, 2]
-    is_inside = (corners.max(axis=1) > 0.0) & (corners.min(axis=1) < camera.size)
-    is_seen = is_inside.all(axis=1) & (distances > _NEAR_PLANE).all(axis=1)
-    columns = [corners.reshape(-1, 6), distances.mean(axis=1)[:, None], colours]
-    return _from_far_to_near(np.concatenate(columns, axis=1)[is_seen])
-
-
-def _material(item: Item) -> dict[str, Any]:
-    """Return the material of an item."""
-    return item.shape.data["materials"][0]
-
-
-def _vertices(item: Item) -> Array:
-    """Return the places of an item's vertices."""
-    data = item.shape.data
-    vertices = _unpacked(data["geometries"][0]["data"]["attributes"]["position"])
-    scale = data["object"]["matrix"][0]
-    return scale * vertices @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-
-
-def _unpacked(packed: dict[str, Any]) -> Array:
-    """Return the numbers of an attribute that `threejs` packed."""
-    return np.frombuffer(packed["array"].data, TYPES[packed["type"]]).reshape(
-        -1, packed["itemSize"]
-    )
-
-
-def _draw_labels(items: Sequence[Item], camera: _Camera, image: Image.Image) -> None:
+def _draw_labels(items: Sequence[Item], camera: Camera, image: Image.Image) -> None:
     """Draw labels."""
     for item in items:
         ((x, y, far),) = camera.project(item.matrix[None, :3, 3])
-        shape = item.shape.data["object"]["matrix"]
-        size = np.array([shape[0], shape[5]]) * camera.pixels_at_one_metre / far
-        if far <= _NEAR_PLANE or not (size >= 1.0).all() or (size > camera.size).any():
+        size = (
+            camera.pixels_at_one_metre
+            / far
+            * np.diag(np.reshape(item.shape.data["object"]["matrix"], (4, 4)))[:2]
+        )
+        if far <= NEAR_PLANE or not (size >= 1.0).all() or (size > camera.size).any():
             continue
         texture = item.shape.data["images"][0]["url"]
-        pixels = np.frombuffer(texture["data"].data, np.uint8)
-        pixels = pixels.reshape(texture["height"], texture["width"], 2)[::-1]  # grey and alpha
-        made = Image.fromarray(np.ascontiguousarray(pixels), "LA").resize(
+        data = np.frombuffer(texture["data"].data, np.uint8).reshape(
+            texture["height"], texture["width"], 2
+        )[::-1]
+        made = Image.fromarray(np.ascontiguousarray(data), "LA").resize(
             (round(size[0]), round(size[1]))
         )
-        corner = (round(x - size[0] / 2), round(y - size[1] / 2))
-        image.paste(made.convert("RGB"), corner, made.getchannel("A"))
+        image.paste(
+            made.convert("RGB"),
+            (round(x - size[0] / 2), round(y - size[1] / 2)),
+            made.getchannel("A"),
+        )
 
 
 def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
     """Draw the title and the legend."""
-    draw, ink, margin = ImageDraw.Draw(image), hex_code(text), 12 * _SUPERSAMPLING
+    draw, ink, margin = ImageDraw.Draw(image), hex_code(text), 12 * SUPERSAMPLING
     for i, line in enumerate(_setting(scene, "set_title", {"text": ""})["text"].splitlines()):
-        y = 8 * _SUPERSAMPLING + 1.3 * i * FONT_SIZE
+        y = 8 * SUPERSAMPLING + 1.3 * i * FONT_SIZE
         draw.text((margin, y), line, font=font(), fill=ink)
     side = FONT_SIZE / 1.4  # of a square
     legend = _setting(scene, "set_legend", {"items": []})["items"]
@@ -281,3 +195,8 @@ def _draw_caption(scene: Scene, text: RGB, image: Image.Image) -> None:
         y = image.height - margin - round(1.4 * i * FONT_SIZE)
         draw.rectangle((margin, y - side, margin + side, y), fill=colour)
         draw.text((margin + 1.1 * FONT_SIZE, y), meaning, font=font(), fill=ink, anchor="ls")
+
+
+def _hex_code(code: int) -> str:
+    """Return a colour as CSS writes it."""
+    return f"#{code:06x}"
