@@ -190,9 +190,7 @@ def _log_in(page: Any, address: str, name: str) -> None:
     page.click("#login_submit", no_wait_after=True)
 
 
-def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(
-    class_: list[Student],
-) -> None:
+def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(class_):
     frames = [picture_in(push_panel_of(student.page)) for student in class_]
     first, second = (frame.evaluate(HEIGHT) for frame in frames)
     for student in class_:
@@ -203,7 +201,7 @@ def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(
     assert [student.strangers for student in class_] == [[], []]
 
 
-def test_no_port_of_a_students_kernel_tells_anything(hub: Hub, class_: list[Student]) -> None:
+def test_no_port_of_a_students_kernel_tells_anything(hub, class_):
     for student in class_:
         (kernel,) = hub.kernels(student.name)
         ports = listening(kernel)
@@ -215,7 +213,7 @@ def test_no_port_of_a_students_kernel_tells_anything(hub: Hub, class_: list[Stud
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2.0)
 
 
-def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student]) -> None:
+def test_a_student_gets_nothing_of_another_ones(hub, class_):
     ada, bob = class_
     kernels = f"{hub.address}/user/{bob.name}/api/kernels"
     own = bob.context.request.get(kernels)
@@ -252,7 +250,7 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
         assert ada.context.request.get(address, max_redirects=0).status in (302, 403), address
 
 
-def test_lesson_03_moves_its_robot_arrows_and_veil(hub: Hub, class_: list[Student]) -> None:
+def test_lesson_03_moves_its_robot_arrows_and_veil(hub, class_):
     bob = class_[1]
     page = bob.context.new_page()
     page.set_default_timeout(1000 * LONG)

@@ -19,7 +19,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
@@ -133,8 +132,8 @@ browser = browser_of_a_file
 
 @pytest.mark.parametrize("name", LESSONS)
 def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_counts_as_writing(
-    lab: str, course: Path, browser: Any, name: str
-) -> None:
+    lab, course, browser, name
+):
     page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, lab)

@@ -83,7 +83,7 @@ def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
 
 
 @LESSONS
-def test_predictions_are_named_in_order(path: Path) -> None:
+def test_predictions_are_named_in_order(path):
     lesson = path.stem.split("_")[0]
     names = [name for cell in cells(path) for name in asked(cell)]
     assert names, "a lesson without a question"
@@ -92,7 +92,7 @@ def test_predictions_are_named_in_order(path: Path) -> None:
 
 
 @LESSONS
-def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
+def test_every_question_is_followed_by_an_empty_prediction(path):
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
         predicted = calls(cell, "predict")
@@ -123,7 +123,7 @@ def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
 
 
 @LESSONS
-def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) -> None:
+def test_every_prediction_is_compared_once_with_a_computed_number(path):
     predicted = {name: i for i, name in named(path, "predict")}
     compared = {name: i for i, name in named(path, "compare")}
     assert len(compared) == len(named(path, "compare"))
@@ -139,7 +139,7 @@ def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) ->
 
 
 @LESSONS
-def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Path) -> None:
+def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path):
     wrong, predicting = [], ""
     for cell in cells(path):
         if cell.cell_type == "markdown":
@@ -152,7 +152,7 @@ def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Pa
 
 
 @LESSONS
-def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
+def test_assertions_are_in_folded_cells_without_output(path):
     wrong = []
     for cell in code(path):
         body = ast.parse(cell.source).body
@@ -174,7 +174,7 @@ def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
 
 
 @LESSONS
-def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> None:
+def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path):
     lesson = path.stem.split("_")[0]
     sources = [cell.source for cell in code(path)]
     sources += [e.solution for name, e in all_exercises().items() if name.startswith(f"{lesson}.")]
@@ -184,7 +184,7 @@ def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> No
 
 
 @LESSONS
-def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
+def test_a_lesson_ends_with_a_review_of_its_predictions(path):
     lesson = path.stem.split("_")[0]
     ((at, call),) = [
         (i, call) for i, cell in enumerate(cells(path)) for call in calls(cell, "review")
@@ -194,7 +194,7 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
 
 
 @LESSONS
-def test_all_lessons_but_the_first_begin_with_recall(path: Path) -> None:
+def test_all_lessons_but_the_first_begin_with_recall(path):
     recalls = [i for i, cell in enumerate(code(path)) if cell.source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
 
@@ -205,7 +205,7 @@ def the_map() -> str:
 
 
 @LESSONS
-def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path: Path) -> None:
+def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path):
     for teaches, tags in taught(path):
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"
@@ -221,7 +221,7 @@ def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(pat
 
 
 @LESSONS
-def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path: Path) -> None:
+def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path):
     stated = re.search(r"\*\*Time\*\* (\d+) minutes", cells(path)[0].source)
     assert stated, "a lesson without a time"
     assert int(stated[1]) == lesson_minutes(path)

@@ -128,8 +128,8 @@ def with_an_answer(source: str) -> str:
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
-    path: Path, lessons: LessonRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    path, lessons, tmp_path, monkeypatch
+):
     home = tmp_path / "home"
     home.mkdir()
     notebook = followed_by_its_learner(path)
@@ -161,7 +161,7 @@ def lines_after_imports(source: str) -> int:
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path: Path) -> None:
+def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path):
     assert path.stat().st_size < 1_000_000
     notebook = read_notebook(path)
     assert "widgets" not in notebook.metadata
@@ -175,7 +175,7 @@ def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path: Pat
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
+def test_a_lesson_starts_from_the_stubs_of_its_exercises(path):
     known = all_exercises()
     cells = {
         c.metadata["exercise"]: c.source
@@ -188,7 +188,7 @@ def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
         assert source == known[name].stub
 
 
-def test_an_exercise_without_an_answer_gets_its_own_verdict() -> None:
+def test_an_exercise_without_an_answer_gets_its_own_verdict():
     verdicts = {name: check(name, None) for name in all_exercises()}
     assert [
         name
@@ -197,7 +197,7 @@ def test_an_exercise_without_an_answer_gets_its_own_verdict() -> None:
     ] == []
 
 
-def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path: Path) -> None:
+def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path):
     spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"
@@ -215,5 +215,5 @@ def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path:
     assert progress.load() == before
 
 
-def test_tests_do_not_touch_the_progress_of_their_user() -> None:
+def test_tests_do_not_touch_the_progress_of_their_user():
     assert Path.home() not in progress.path().parents

@@ -103,7 +103,7 @@ def pages(folder: Path) -> Iterator[Path]:
     return (path for path in sorted(folder.rglob("*.html")) if "_static" not in path.parts)
 
 
-def test_every_link_within_the_site_leads_somewhere(built: Path) -> None:
+def test_every_link_within_the_site_leads_somewhere(built):
     wrong = []
     for path in pages(built):
         for link in page_at(path).links | page_at(path).loaded:
@@ -122,7 +122,7 @@ def test_every_link_within_the_site_leads_somewhere(built: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_no_page_loads_anything_from_elsewhere_or_is_large(built: Path) -> None:
+def test_no_page_loads_anything_from_elsewhere_or_is_large(built):
     wrong = []
     for path in pages(built):
         loaded = page_at(path).loaded
@@ -137,7 +137,7 @@ def test_no_page_loads_anything_from_elsewhere_or_is_large(built: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_pages_say_what_they_are_and_figures_what_they_show(built: Path) -> None:
+def test_pages_say_what_they_are_and_figures_what_they_show(built):
     made = {"genindex.html", "py-modindex.html", "search.html"}
     texts = [path for path in pages(built) if not made & set(path.parts)]
     assert len(texts) > 25
@@ -145,7 +145,7 @@ def test_pages_say_what_they_are_and_figures_what_they_show(built: Path) -> None
     assert [path.name for path in texts if "" in page_at(path).alts] == []
 
 
-def test_equations_and_functions_lead_to_each_other(built: Path) -> None:
+def test_equations_and_functions_lead_to_each_other(built):
     map_page = page_at(built / "lessons" / "equations.html")
     for entry in equations.entries():
         package, name = entry.path.split(".", 1)
@@ -162,7 +162,7 @@ def anchor(number: str) -> str:
 
 
 @needs_chromium
-def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any) -> None:
+def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
     page = browser.new_page(viewport={"width": 390, "height": 800})
     asked, said, wide = [], [], []
     page.on("request", lambda request: asked.append(request.url))
@@ -178,7 +178,7 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built: Path, browser: Any
 
 
 @needs_chromium
-def test_formulas_are_drawn_with_brackets_that_grow(built: Path, browser: Any) -> None:
+def test_formulas_are_drawn_with_brackets_that_grow(built, browser):
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.goto((built / "lessons" / "equations.html").as_uri() + "#eq-13")
     page.evaluate("document.fonts.ready")
@@ -219,7 +219,7 @@ SEARCHES = {
 
 
 @needs_chromium
-def test_excerpts_of_search_results_are_sentences(built: Path, browser: Any) -> None:
+def test_excerpts_of_search_results_are_sentences(built, browser):
     page = browser.new_page()
     page.goto((built / "search.html").as_uri())
     found = """<nav><p>A cone in a list.</p></nav><div class=cell><p>cone = 0</p></div>
@@ -230,7 +230,7 @@ def test_excerpts_of_search_results_are_sentences(built: Path, browser: Any) -> 
 
 
 @needs_chromium
-def test_search_lists_the_right_page_among_the_first_three(built: Path, browser: Any) -> None:
+def test_search_lists_the_right_page_among_the_first_three(built, browser):
     page, found = browser.new_page(), {}
     results = page.locator("#search-results li > a")
     for words in SEARCHES:
@@ -244,7 +244,7 @@ def test_search_lists_the_right_page_among_the_first_three(built: Path, browser:
     } == {}
 
 
-def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path: Path) -> None:
+def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path):
     built, folder = tmp_path / "built", tmp_path / "gh-pages"
     (built / "api").mkdir(parents=True)
     (folder / ".git").mkdir(parents=True)
@@ -281,7 +281,7 @@ class NoPictures:
         return "<b>a scene</b>" if "scene" in data else None
 
 
-def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
+def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
     widget = "application/vnd.jupyter.widget-view+json"
     outputs = [
         new_output("stream", name="stderr", text="compiling"),
@@ -320,7 +320,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel() -> None:
     assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")
 
 
-def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
+def test_a_lesson_is_run_again_when_it_has_changed(tmp_path):
     lesson, kept = tmp_path / "07_page.ipynb", tmp_path / "kept"
     for printed in ("once", "once", "twice"):
         nbformat.write(new_notebook(cells=[new_code_cell(f"print({printed!r})", id="a")]), lesson)
@@ -331,7 +331,7 @@ def test_a_lesson_is_run_again_when_it_has_changed(tmp_path: Path) -> None:
     assert len(list(kept.iterdir())) == 1
 
 
-def test_links_leave_code_formulas_and_links_as_they_are() -> None:
+def test_links_leave_code_formulas_and_links_as_they_are():
     for text in (
         "`f(7)`",
         "$h (7)$",
@@ -349,7 +349,7 @@ def test_links_leave_code_formulas_and_links_as_they_are() -> None:
     )
 
 
-def test_every_formula_of_the_course_becomes_mathml_in_the_font_of_the_site() -> None:
+def test_every_formula_of_the_course_becomes_mathml_in_the_font_of_the_site():
     texts = [
         cell.source
         for path in NOTEBOOKS.glob("*.ipynb")
@@ -373,7 +373,7 @@ def test_every_formula_of_the_course_becomes_mathml_in_the_font_of_the_site() ->
     assert [letter for letter in shown if bytes(font.getmask(letter)) == missing] == []
 
 
-def test_a_lesson_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_lesson_that_is_not_there_is_told(tmp_path):
     command = [
         sys.executable,
         "-m",

@@ -12,7 +12,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import Any
 
 import nbformat
 import pytest
@@ -91,7 +90,7 @@ def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 browser = browser_of_a_file
 
 
-def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> None:
+def test_the_pictures_of_a_page_without_code_move(voila, browser):
     page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, voila)

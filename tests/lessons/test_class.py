@@ -63,7 +63,7 @@ def squeezed(line: str) -> str:
     return re.sub(r"\s+", "", line)
 
 
-def test_an_assignment_holds_no_solution(assigned: Path) -> None:
+def test_an_assignment_holds_no_solution(assigned):
     files = [path for path in assigned.rglob("*") if path.is_file()]
     found = {path: texts_of(path) for path in files}
     secret = {(n, t) for n, e in EXERCISES.items() for t in (e.solution, e.explanation) if t}
@@ -90,7 +90,7 @@ def test_an_assignment_holds_no_solution(assigned: Path) -> None:
     assert not any("solved" in path.name or "tests" in path.parts for path in files)
 
 
-def test_an_assignment_checks_answers_and_names_the_teacher(assigned: Path, learner: Path) -> None:
+def test_an_assignment_checks_answers_and_names_the_teacher(assigned, learner):
     program = (
         "import sys; sys.dont_write_bytecode = True\n"
         "from floatbase.lessons import all_exercises, check, reveal\n"
@@ -115,9 +115,7 @@ def test_an_assignment_checks_answers_and_names_the_teacher(assigned: Path, lear
     assert int(known) == len(EXERCISES)
 
 
-def test_an_assignment_needs_known_lessons_and_a_new_folder(
-    assigned: Path, learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_assignment_needs_known_lessons_and_a_new_folder(assigned, learner, capsys):
     with pytest.raises(InputError, match="99"):
         package.write_assignment(learner / "new", ["99"])
     assert not (learner / "new").exists()
@@ -127,7 +125,7 @@ def test_an_assignment_needs_known_lessons_and_a_new_folder(
         main(["assign", "99", "--to", "new", "--without-solutions"])
 
 
-def test_reveal_prints_a_solution_of_the_whole_course(capsys: pytest.CaptureFixture[str]) -> None:
+def test_reveal_prints_a_solution_of_the_whole_course(capsys):
     for answer in (3.0, 4.0):
         check("00.1", answer)
     reveal("00.1")
@@ -140,7 +138,7 @@ OWN = [name for name, exercise in EXERCISES.items() if exercise.own]
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_personal_numbers_have_their_own_right_answers(name: str) -> None:
+def test_personal_numbers_have_their_own_right_answers(name):
     exercise = EXERCISES[name]
     assert exercise.own is not None and len(set(exercise.own.values)) > 4
     standard = [answer for answer, hint in exercise.examples() if not hint]
@@ -153,9 +151,7 @@ def test_personal_numbers_have_their_own_right_answers(name: str) -> None:
         assert str(value) in exercise.own.text.format(value)
 
 
-def test_a_student_always_gets_the_same_numbers(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_student_always_gets_the_same_numbers(capsys):
     own = EXERCISES["00.1"].own
     assert own is not None
     values = {student: own.value("00.1", student) for student in map(str, range(60))}
@@ -169,11 +165,11 @@ def test_a_student_always_gets_the_same_numbers(
     assert check("00.1", MASS * (9.81 + values["7"])).right
     for wrong in ("", "a\nb", "a" * 81, 5):
         with pytest.raises(InputError, match="id"):
-            own_numbers(wrong)  # type: ignore[arg-type]
+            own_numbers(wrong)
     assert progress.student() == "7"
 
 
-def test_grading_uses_the_numbers_of_the_id(learner: Path) -> None:
+def test_grading_uses_the_numbers_of_the_id(learner):
     own_numbers("s7")
     own = EXERCISES["00.1"].own
     assert own is not None
@@ -243,9 +239,7 @@ CANVAS = "Student,ID,SIS User ID,SIS Login ID,Section,Week 1 (4711)\n    Points 
 MOODLE = "First name,Surname,ID number,Institution,Email address\n"
 
 
-def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(learner, capsys):
     expected = class_of_sixty(learner)
     files = sorted(str(path) for path in learner.glob("s*.json"))
     (learner / "canvas.csv").write_text(
@@ -282,7 +276,7 @@ def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
     assert np.mean([p for p in forged if p is not None]) < full - 1
 
 
-def test_a_gradebook_matches_files_without_an_id_by_name(learner: Path) -> None:
+def test_a_gradebook_matches_files_without_an_id_by_name(learner):
     (learner / "roster.csv").write_text(
         'Student,ID,SIS User ID,Section\n"Curie, Marie",1,m1,A\n"Noether, Emmy",2,e2,A\n'
     )
@@ -314,7 +308,7 @@ def test_a_gradebook_matches_files_without_an_id_by_name(learner: Path) -> None:
          "Marie\tCurie\tm1\t-\nEmmy\tNoether\te2\t4\n"),
     ],
 )  # fmt: skip
-def test_a_gradebook_reads_other_forms_of_rosters(learner: Path, kind: str, roster: str) -> None:
+def test_a_gradebook_reads_other_forms_of_rosters(learner, kind, roster):
     """Importers delete a grade whose cell is empty, so a student without a file has no row."""
     (learner / "roster.csv").write_text(roster)
     check("00.1", MASS * 11.81)
@@ -341,9 +335,7 @@ def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:
     return found
 
 
-def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(
-    learner: Path,
-) -> None:
+def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(learner):
     class_of_sixty(learner)
     meta = {
         "created_at": (DUE + timedelta(days=1.5)).isoformat(),
@@ -369,9 +361,7 @@ def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(
     assert results(learner, [learner / "s00.json"])["score"] > 0
 
 
-def test_an_autograder_consists_of_a_package_and_two_programs(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_autograder_consists_of_a_package_and_two_programs(learner, capsys):
     main(
         [
             "grade",

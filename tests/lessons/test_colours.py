@@ -34,7 +34,7 @@ def sources() -> Iterator[tuple[str, str]]:
         )
 
 
-def test_lessons_use_the_viewers_colours_and_not_those_of_cones() -> None:
+def test_lessons_use_the_viewers_colours_and_not_those_of_cones():
     texts = list(sources())
     assert len(texts) > 100
     assert [(name, found) for name, text in texts for found in re.findall(CODE, text)] == []

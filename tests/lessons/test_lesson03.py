@@ -18,7 +18,7 @@ GO2 = fb.load("go2")
 RANK_TOLERANCE = 1e-9
 
 
-def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce() -> None:
+def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce():
     eom = rising_solo8_eom()
     assert np.linalg.matrix_rank(eom.J, tol=RANK_TOLERANCE) == 10
     np.testing.assert_allclose(eom.J @ eom.state.v, 0.0, atol=1e-12)
@@ -32,9 +32,7 @@ def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce() -> None:
     [tuple(f.frame for f in GO2.feet), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)],
     ids=len,
 )
-def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces(
-    frames: tuple[str, ...],
-) -> None:
+def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces(frames):
     contacts = fb.Contacts.points(GO2, mu=0.7).only(*frames)
     space = fb.feasible_space(fb.equations_of_motion(GO2.standing(), contacts))
     desired = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
@@ -45,7 +43,7 @@ def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces
 
 
 @pytest.mark.parametrize("bend", [0.0, 0.5, 1.5])
-def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> None:
+def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend):
     solo12 = fb.load("solo12")
     state = upright_solo12(solo12, bend)
     assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [

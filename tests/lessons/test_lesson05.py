@@ -32,7 +32,7 @@ FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.3
 ROUNDING = 1e-9  # of forces of 100 N and levers of 1 m
 
 
-def test_no_weights_solve_exercise_05_3() -> None:
+def test_no_weights_solve_exercise_05_3():
     """No α and no weight of (23) keeps both the wrench and the friction ratios, whatever the normal
     force it prefers.
     """
@@ -50,7 +50,7 @@ def test_no_weights_solve_exercise_05_3() -> None:
                 assert not right("05.3", design)
 
 
-def test_exercise_05_1_has_the_wrench_of_the_controller() -> None:
+def test_exercise_05_1_has_the_wrench_of_the_controller():
     """Its cost on the forces is zero where they give that wrench, but for (23)."""
     now, goal = moving_and_goal_state()
     controller = AnalyticController(GO2, EOM.contacts, goal, bias_weight=1e-12)
@@ -60,7 +60,7 @@ def test_exercise_05_1_has_the_wrench_of_the_controller() -> None:
 
 
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
-def test_a_friction_ratio_is_tangential_over_normal_force(normal: list[float]) -> None:
+def test_a_friction_ratio_is_tangential_over_normal_force(normal):
     contacts = fb.Contacts.points(GO2, normals=normal)
     n, t = np.array(normal), np.array([0.0, 1.0, 0.0])
     forces = [10 * n + 5 * t, 10 * n, -10 * n + t, t]
@@ -69,7 +69,7 @@ def test_a_friction_ratio_is_tangential_over_normal_force(normal: list[float]) -
     )
 
 
-def test_the_arm_moves_the_centre_of_mass() -> None:
+def test_the_arm_moves_the_centre_of_mass():
     ahead, left, right_hand = (
         com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2)
     )
@@ -81,7 +81,7 @@ def test_the_arm_moves_the_centre_of_mass() -> None:
     np.testing.assert_allclose(turned, expected, atol=ROUNDING)
 
 
-def test_the_engine_measures_the_planned_forces() -> None:
+def test_the_engine_measures_the_planned_forces():
     forces = inclined_design()(FORCE).minimiser()
     record = fb.rollout(
         fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1

@@ -26,7 +26,7 @@ LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
 SOLVED = 1e-5  # N: what the QP solver leaves in rows of forces up to 200 N
 
 
-def test_the_constrained_minimum_is_the_projection_onto_the_polyhedron() -> None:
+def test_the_constrained_minimum_is_the_projection_onto_the_polyhedron():
     cost = fb.Quadratic.from_residual(np.eye(3), [3.0, 0.0, 1.0])
     rows = FrictionPolyhedron(UP, 0.5, 4).face_matrix
     found = constrained_minimiser(cost, rows)
@@ -38,7 +38,7 @@ def test_the_constrained_minimum_is_the_projection_onto_the_polyhedron() -> None
     )
 
 
-def test_a_pushed_controller_plans_forces_inside_the_cones() -> None:
+def test_a_pushed_controller_plans_forces_inside_the_cones():
     controller = make_controller()
     assert isinstance(controller, ConeController)
     still = fb.rollout(fb.Simulation(controller.robot), controller, 0.1)
@@ -60,7 +60,7 @@ def test_a_pushed_controller_plans_forces_inside_the_cones() -> None:
     assert pushed.outcome == "completed"
 
 
-def test_a_larger_weight_reduces_the_error_of_the_moment() -> None:
+def test_a_larger_weight_reduces_the_error_of_the_moment():
     state = make_controller().state
     aside = state.replace(
         v=np.eye(18)[1] * 1.5
@@ -82,7 +82,7 @@ def test_a_larger_weight_reduces_the_error_of_the_moment() -> None:
     assert moment_then < 0.5 * moment and force_then > force > 1.0
 
 
-def test_the_torques_produce_the_planned_forces() -> None:
+def test_the_torques_produce_the_planned_forces():
     controller = make_controller()
     state = controller.robot.random_state(3, spread=0.05)
     q = controller.robot.standing().q.copy()
@@ -94,7 +94,7 @@ def test_the_torques_produce_the_planned_forces() -> None:
     assert np.allclose(fb.forces_from_torques(eom)(command.tau), command.forces, atol=1e-6)
 
 
-def test_feet_reach_their_positions_or_an_error_is_raised() -> None:
+def test_feet_reach_their_positions_or_an_error_is_raised():
     robot = judges.load("go2")
     home = robot.standing()
     places = {
@@ -108,18 +108,18 @@ def test_feet_reach_their_positions_or_an_error_is_raised() -> None:
         state_with_feet_at(robot, home.q[:3] + [0.0, 0.0, 1.0], places)
 
 
-def test_a_slope_has_the_normal_of_its_angle() -> None:
+def test_a_slope_has_the_normal_of_its_angle():
     assert np.allclose(slope_normal(20), [-np.sin(np.deg2rad(20)), 0.0, np.cos(np.deg2rad(20))])
 
 
-def test_the_constrained_minimum_accepts_any_limits() -> None:
+def test_the_constrained_minimum_accepts_any_limits():
     cost = fb.Quadratic.from_residual(np.eye(2), [3.0, 4.0])
     found = constrained_minimiser(cost, np.eye(2), [-1.0, 5.0])
     assert np.allclose(found, [-1.0, 4.0], atol=SOLVED)
     assert np.allclose(constrained_minimiser(cost, np.eye(2), 2.0), [2.0, 2.0], atol=SOLVED)
 
 
-def test_the_engine_measures_the_requested_acceleration_if_friction_suffices() -> None:
+def test_the_engine_measures_the_requested_acceleration_if_friction_suffices():
     record = accelerate([1.0, 0.0, 0.0])
     assert measured_acceleration(record)[0] == pytest.approx(1.0, rel=0.05)
     # the controller believes in more friction than the floor has

@@ -17,7 +17,7 @@ FORMULA = 0.07  # of what a spring says: legs have masses of their own
 
 
 @pytest.mark.parametrize("kp", [100.0, 400.0, 1000.0])
-def test_an_unknown_mass_lowers_the_centre_of_mass_like_a_spring(kp: float) -> None:
+def test_an_unknown_mass_lowers_the_centre_of_mass_like_a_spring(kp):
     assert com_sag(kp) == pytest.approx(BAG_MASS / GO2.mass * 9.81 / kp, rel=FORMULA)
     assert com_sag(kp, 0.0) == pytest.approx(0.0, abs=1e-5)
 
@@ -34,7 +34,7 @@ def _shift() -> np.ndarray:
     return -(a * x0 + b * y0 + c) / (a**2 + b**2) * np.array([a, b, 0.0])
 
 
-def test_the_answer_of_p_2_keeps_the_robot_up_for_longest() -> None:
+def test_the_answer_of_p_2_keeps_the_robot_up_for_longest():
     shift = _shift()
     best = time_on_two_feet(shift)
     assert best > 1.0 > 0.2 + time_on_two_feet(-shift) and best > 1.3 * time_on_two_feet(
@@ -43,7 +43,7 @@ def test_the_answer_of_p_2_keeps_the_robot_up_for_longest() -> None:
     assert best > 1.2 * time_on_two_feet(2 * shift)
 
 
-def test_the_answer_of_p_2_solves_the_first_challenge() -> None:
+def test_the_answer_of_p_2_solves_the_first_challenge():
     x, y, _ = _shift()
     challenge = CHALLENGES[0]
     session, judge = (

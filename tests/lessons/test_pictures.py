@@ -92,9 +92,7 @@ def scene_at(
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_samples_of_a_slider_span_its_range(
-    low: float, first: float, high: float, step: float
-) -> None:
+def test_samples_of_a_slider_span_its_range(low, first, high, step):
     found = sample_values(low, first, high, step)
     assert {low, first, high} <= set(found) and list(found) == sorted(set(found))
     assert 6 <= len(found) <= 16
@@ -105,7 +103,7 @@ def test_samples_of_a_slider_span_its_range(
     assert sample_values(low, low, low, step) == (low,)
 
 
-def test_few_combinations_are_complete_and_many_move_one_slider_at_a_time() -> None:
+def test_few_combinations_are_complete_and_many_move_one_slider_at_a_time():
     assert combinations([3, 2], [1, 0]) == ([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)], True)
     alone, together = combinations([5, 5, 5], [1, 2, 4])
     assert (
@@ -121,9 +119,7 @@ def test_few_combinations_are_complete_and_many_move_one_slider_at_a_time() -> N
 # panels -------------------------------------------------------------------------------------------
 
 
-def test_a_panel_stores_the_live_picture_of_each_sample(
-    view: fb.Viewer,
-) -> None:
+def test_a_panel_stores_the_live_picture_of_each_sample(view):
     panel = squat(
         view,
         samples={"down": (0, 0.05, 0.1), "force": (0, 30, 60)},
@@ -159,7 +155,7 @@ def test_a_panel_stores_the_live_picture_of_each_sample(
     assert changed < 0.3 * meshes  # the robot's shape is held once
 
 
-def test_a_site_leaves_a_panel_unchanged_and_names_its_sliders(view: fb.Viewer) -> None:
+def test_a_site_leaves_a_panel_unchanged_and_names_its_sliders(view):
     panel = squat(view, down=(0, 0.02, 0.1, "m"))
     before = dict(view.window.scene.file_entries())
     data = data_of(panel)
@@ -170,7 +166,7 @@ def test_a_site_leaves_a_panel_unchanged_and_names_its_sliders(view: fb.Viewer) 
     assert data["words"] and "one slider" not in data["words"]
 
 
-def test_a_panel_without_a_view_stores_its_notes() -> None:
+def test_a_panel_without_a_view_stores_its_notes():
     data = data_of(
         slider_panel(None, lambda x: f"<img alt='{x:.0f}'>", samples={"x": (0, 1, 2)}, x=(0, 1, 2))
     )
@@ -178,12 +174,12 @@ def test_a_panel_without_a_view_stores_its_notes() -> None:
     assert data["stops"] == {"0": [0], "1": [1], "2": [2]}
 
 
-def test_a_control_refuses_an_unknown_position() -> None:
+def test_a_control_refuses_an_unknown_position():
     with pytest.raises(fb.errors.ViewerError, match="position 3"):
         static_export.Control("x", ("0", "1"), 3)
 
 
-def test_a_still_picture_has_no_animation(view: fb.Viewer) -> None:
+def test_a_still_picture_has_no_animation(view):
     record = fb.rollout(fb.Simulation(view.robot), ConstantTorques(np.zeros(12)), 0.02)
     assert any(key[1] == ANIMATION for key in scene_at(data_of(view.play(record))))
     assert not any(
@@ -191,7 +187,7 @@ def test_a_still_picture_has_no_animation(view: fb.Viewer) -> None:
     )
 
 
-def test_a_push_panel_becomes_recorded_runs(view: fb.Viewer) -> None:
+def test_a_push_panel_becomes_recorded_runs(view):
     sim = fb.Simulation(view.robot)
     controller = fb.WholeBodyController(view.robot, sim.feet, fb.standing_tasks(sim.state))
     view.show(sim.state, sim.feet)
@@ -242,7 +238,7 @@ def placed(html: str) -> str:
     return re.findall(r'data-picture="([^"]+)"', html)[0]
 
 
-def test_files_hold_the_outputs_and_shared_meshes_once(view: fb.Viewer, tmp_path: Path) -> None:
+def test_files_hold_the_outputs_and_shared_meshes_once(view, tmp_path):
     made, data, names = Pictures(tmp_path), [], []
     for title in ("one", "two"):
         bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
@@ -263,7 +259,7 @@ def test_files_hold_the_outputs_and_shared_meshes_once(view: fb.Viewer, tmp_path
         assert sum(map(len, own)) < 0.05 * sum(map(len, shared))
 
 
-def test_a_later_build_keeps_the_files_of_an_earlier_one(view: fb.Viewer, tmp_path: Path) -> None:
+def test_a_later_build_keeps_the_files_of_an_earlier_one(view, tmp_path):
     view.show(view.robot.standing())
     first, second = Pictures(tmp_path), Pictures(tmp_path)
     first.place(view._repr_mimebundle_())
@@ -274,10 +270,10 @@ def test_a_later_build_keeps_the_files_of_an_earlier_one(view: fb.Viewer, tmp_pa
     assert all(path.read_bytes() == content for path, content in before.items())
 
 
-def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path: Path) -> None:
+def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path):
     made = Pictures(tmp_path)
     assert made.place({"text/html": "<b>3</b>"}) is None and made.place({}) is None
-    panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})  # type: ignore[arg-type]
+    panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})
     html = made.place(panel._repr_mimebundle_())
     assert (
         html is not None
@@ -289,7 +285,7 @@ def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path: Path) -> None:
     assert 'type="range"' in html and "aria-label" in html and "aria-valuetext" in html
 
 
-def test_the_playground_of_a_site_stands_still(go2: fb.Robot) -> None:
+def test_the_playground_of_a_site_stands_still(go2):
     from floatbase.playground import playground
 
     field = playground("go2")
@@ -299,7 +295,7 @@ def test_the_playground_of_a_site_stands_still(go2: fb.Robot) -> None:
     field.close()
 
 
-def test_a_site_has_every_set_of_constraints_of_the_game() -> None:
+def test_a_site_has_every_set_of_constraints_of_the_game():
     from floatbase.lessons.lessonC import ActiveSetGame
 
     game = ActiveSetGame([(0.5, -1.0)])
@@ -405,7 +401,7 @@ def set_to(page: Any, number: int, value: int) -> None:
 
 
 @needs_chromium
-def test_a_slider_moves_the_robot_without_a_kernel(page: Any) -> None:
+def test_a_slider_moves_the_robot_without_a_kernel(page):
     frame = inside(page)
     height = "viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.z"
     before = frame.evaluate(height)
@@ -423,7 +419,7 @@ def test_a_slider_moves_the_robot_without_a_kernel(page: Any) -> None:
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_sample_looks_the_same_after_any_other(page: Any) -> None:
+def test_a_sample_looks_the_same_after_any_other(page):
     frame = inside(page)
     seen: dict[int, Any] = {}
     count = 1
@@ -441,9 +437,7 @@ def test_a_sample_looks_the_same_after_any_other(page: Any) -> None:
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_recording_plays_on_request_and_rests_out_of_sight(
-    page: Any,
-) -> None:
+def test_a_recording_plays_on_request_and_rests_out_of_sight(page):
     frame = inside(page, 1)
     assert frame.evaluate("[viewer.animator.playing, viewer.animator.duration]") == [
         False,
@@ -474,7 +468,7 @@ FRAMED = """(address) => new Promise((done) => {
 @pytest.mark.parametrize(
     "host", ["127.0.0.1", "localhost"]
 )  # the site's own, and another origin on the same machine
-def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, host: str) -> None:
+def test_the_viewer_obeys_pages_of_its_own_site_only(site, browser, host):
     page = browser.new_page()
     with served(site) as address:
         page.goto(f"{address}/_static/pictures.css".replace("127.0.0.1", host))
@@ -492,7 +486,7 @@ def test_the_viewer_obeys_pages_of_its_own_site_only(site: Path, browser: Any, h
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_page_of_pictures_fits_a_phone(page: Any) -> None:
+def test_a_page_of_pictures_fits_a_phone(page):
     page.set_viewport_size({"width": 390, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     for box in (page.locator("input[type=range]").nth(i).bounding_box() for i in range(3)):

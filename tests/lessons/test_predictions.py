@@ -58,9 +58,7 @@ def lines(home: Path) -> list[Any]:
         ([1, 2], [1.0, 2.0, 3.0], ["(1, 2, 3) mm", "(1, 2) mm"]),  # of a lesson that has changed
     ],
 )  # fmt: skip
-def test_a_prediction_is_shown_beside_the_result_and_how_far_off_it_was(
-    said: Any, given: Any, result: Any, shown: list[str]
-) -> None:
+def test_a_prediction_is_shown_beside_the_result_and_how_far_off_it_was(said, given, result, shown):
     predict("02.c", given, unit="mm", count=np.size(given))
     compare("02.c", np.array(result))
     before, after = said()
@@ -70,9 +68,7 @@ def test_a_prediction_is_shown_beside_the_result_and_how_far_off_it_was(
 
 
 @pytest.mark.parametrize("skipped", [(), (...,), (None,)])
-def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(
-    home: Path, said: Any, skipped: tuple[Any, ...]
-) -> None:
+def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(home, said, skipped):
     predict("02.c", *skipped, unit="mm")
     compare("02.c", 69.2)
     review("02")
@@ -80,14 +76,14 @@ def test_a_prediction_may_be_skipped_and_leaves_nothing_behind(
     assert list(home.iterdir()) == []
 
 
-def test_what_was_said_stands_in_a_new_copy_of_the_lesson(said: Any) -> None:
+def test_what_was_said_stands_in_a_new_copy_of_the_lesson(said):
     predict("02.c", 40, unit="mm")
     predict("02.c", ..., unit="mm")
     compare("02.c", 69.2)
     assert all("40 mm" in line for line in said())
 
 
-def test_a_count_is_printed_whole_and_compared_by_difference(said: Any) -> None:
+def test_a_count_is_printed_whole_and_compared_by_difference(said):
     predict("03.a", 5)
     for result in (np.int64(6), 5, 123, 4):
         compare("03.a", result)
@@ -98,7 +94,7 @@ def test_a_count_is_printed_whole_and_compared_by_difference(said: Any) -> None:
     assert numbers == [[6, 5, 1], [5], [123, 5, 118], [4, 5, 1]]
 
 
-def test_several_numbers_need_no_brackets(said: Any) -> None:
+def test_several_numbers_need_no_brackets(said):
     for given in (([1, 2],), (1, 2)):
         predict("03.d", *given, unit="N", count=2)
     first, second = said()
@@ -108,7 +104,7 @@ def test_several_numbers_need_no_brackets(said: Any) -> None:
 @pytest.mark.parametrize(
     "answer", ["in the f", "IN THE FIRST MILLISECOND", " In The First ", "in the first millisecond"]
 )
-def test_a_choice_is_known_by_its_beginning(said: Any, answer: str) -> None:
+def test_a_choice_is_known_by_its_beginning(said, answer):
     predict("00.b", answer, choices=CHOICES)
     compare("00.b", CHOICES[2])
     compare("00.b", CHOICES[1])
@@ -117,13 +113,13 @@ def test_a_choice_is_known_by_its_beginning(said: Any, answer: str) -> None:
     assert same.count(CHOICES[2]) == 1 and CHOICES[1] in other and CHOICES[2] in other
 
 
-def test_a_choice_that_is_the_beginning_of_another_is_meant_when_it_is_said() -> None:
+def test_a_choice_that_is_the_beginning_of_another_is_meant_when_it_is_said():
     predict("00.b", "less", choices=["less", "less than half"])
     assert progress.predictions()["00.b"]["said"] == "less"
 
 
 @pytest.mark.parametrize("answer", ["in", "rest", "", 3, ["at rest"] * 2])
-def test_what_is_no_choice_is_told_with_all_choices(home: Path, said: Any, answer: Any) -> None:
+def test_what_is_no_choice_is_told_with_all_choices(home, said, answer):
     predict("00.b", answer, choices=CHOICES)
     (line,) = said()
     assert all(choice in line for choice in CHOICES)
@@ -141,16 +137,14 @@ UNUSABLE = {
 
 @pytest.mark.parametrize("kind", UNUSABLE)
 @pytest.mark.parametrize("count", [1, 3])
-def test_what_is_no_prediction_is_told_in_one_line(
-    home: Path, said: Any, kind: str, count: int
-) -> None:
+def test_what_is_no_prediction_is_told_in_one_line(home, said, kind, count):
     predict("02.c", UNUSABLE[kind], unit="mm", count=count)
     (line,) = said()
     assert "mm" in line and "..." in line
     assert lines(home) == []
 
 
-def test_the_same_again_adds_no_line_and_another_does(home: Path) -> None:
+def test_the_same_again_adds_no_line_and_another_does(home):
     for _ in range(3):
         predict("02.c", 40, unit="mm")
         compare("02.c", 69.2)
@@ -160,14 +154,14 @@ def test_the_same_again_adds_no_line_and_another_does(home: Path) -> None:
     assert lines(home)[2:] == [{"02.c": {"said": 50, "unit": "mm"}}]
 
 
-def test_predictions_are_no_tries_and_tries_no_predictions(home: Path) -> None:
+def test_predictions_are_no_tries_and_tries_no_predictions(home):
     predict("00.a", 40, unit="mm")
     check("00.1", 3.0)
     assert list(progress.load()) == ["00.1"]
     assert progress.predictions() == {"00.a": {"said": 40, "unit": "mm"}}
 
 
-def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
+def test_a_lesson_is_reviewed_and_all_of_them_are(said):
     predict("02.c", 40, unit="mm")
     compare("02.c", 69.2)
     predict("02.a", "at", choices=CHOICES)
@@ -191,7 +185,7 @@ def test_a_lesson_is_reviewed_and_all_of_them_are(said: Any) -> None:
         assert [line.split()[0] for line in said()] == ["you", *rows]
 
 
-def test_a_lesson_named_by_a_letter_comes_after_the_numbered_ones(said: Any) -> None:
+def test_a_lesson_named_by_a_letter_comes_after_the_numbered_ones(said):
     for name in ("C.b", "07.a", "C.a", "A.a"):
         predict(name, 2)
         compare(name, 3)
@@ -221,7 +215,7 @@ DAMAGED = (
 
 
 @pytest.mark.parametrize("text", DAMAGED)
-def test_damage_is_left_out_and_left_as_it_is(home: Path, said: Any, text: str) -> None:
+def test_damage_is_left_out_and_left_as_it_is(home, said, text):
     (home / "progress.jsonl").write_text(text)
     compare("02.c", 69.2)
     review()
@@ -235,9 +229,7 @@ def test_damage_is_left_out_and_left_as_it_is(home: Path, said: Any, text: str) 
 
 
 @pytest.mark.parametrize("before", ["a text", [1, 2]])
-def test_what_was_said_to_another_question_of_that_name_does_no_harm(
-    said: Any, before: Any
-) -> None:
+def test_what_was_said_to_another_question_of_that_name_does_no_harm(said, before):
     progress.append("02.c", {"said": before, "unit": "mm"})
     compare("02.c", 69.2)
     review()
@@ -245,8 +237,8 @@ def test_what_was_said_to_another_question_of_that_name_does_no_harm(
 
 
 def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_says_why(
-    home: Path, monkeypatch: pytest.MonkeyPatch, said: Any
-) -> None:
+    home, monkeypatch, said
+):
     (home / "file").write_text("")
     monkeypatch.setenv("FLOATBASE_HOME", str(home / "file"))
     predict("05.u", 40, unit="mm")
@@ -261,7 +253,7 @@ def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_sa
     assert progress.predictions() == {"05.u": {"said": 40, "unit": "mm", "is": 69.2}}
 
 
-def test_a_name_that_was_left_out_is_missed() -> None:
+def test_a_name_that_was_left_out_is_missed():
     for call in (lambda: predict(3.0, unit="N"), lambda: compare(3.0, 2.0), lambda: review(2)):
         with pytest.raises(InputError, match="string"):
             call()
@@ -269,12 +261,12 @@ def test_a_name_that_was_left_out_is_missed() -> None:
 
 
 @pytest.mark.parametrize("nothing", [None, True, {}, 1j])
-def test_a_result_that_is_none_is_refused(nothing: Any) -> None:
+def test_a_result_that_is_none_is_refused(nothing):
     with pytest.raises(InputError, match="value"):
         compare("02.c", nothing)
 
 
-def test_what_was_sure_and_wrong_comes_first_and_calibration_last(home: Path, said: Any) -> None:
+def test_what_was_sure_and_wrong_comes_first_and_calibration_last(home, said):
     for name, answer, result, sure in (
         ("02.c", 70, 69.2, True),
         ("02.d", 3, 43.0, False),
@@ -292,7 +284,7 @@ def test_what_was_sure_and_wrong_comes_first_and_calibration_last(home: Path, sa
     assert re.findall(r"\d+ of \d+", calibration) == ["1 of 2", "0 of 1"]
     assert progress.predictions()["02.d"]["sure"] is False
     with pytest.raises(InputError, match="sure"):
-        predict("02.c", 70, sure="yes")  # type: ignore[arg-type]
+        predict("02.c", 70, sure="yes")
 
 
 @pytest.mark.parametrize(
@@ -304,9 +296,7 @@ def test_what_was_sure_and_wrong_comes_first_and_calibration_last(home: Path, sa
         ("Yes", "yes", "", True), ("yes", 3, "", False), (3, "yes", "", False),
     ],
 )  # fmt: skip
-def test_a_prediction_counts_as_right_within_a_tenth_of_the_result(
-    said: Any, result: Any, unit: str, right: bool
-) -> None:
+def test_a_prediction_counts_as_right_within_a_tenth_of_the_result(said, result, unit, right):
     assert is_right(said, result, unit) is right
 
 
@@ -317,7 +307,7 @@ def test_a_prediction_counts_as_right_within_a_tenth_of_the_result(
         ("at rest", "at rest"), (np.nan, None),
     ],
 )  # fmt: skip
-def test_a_result_travels_as_data_with_the_digits_that_are_shown(result: Any, data: Any) -> None:
+def test_a_result_travels_as_data_with_the_digits_that_are_shown(result, data):
     """Digits that are not shown differ from processor to processor."""
     publisher = CapturingDisplayPublisher()
     shell = InteractiveShell.instance(display_pub_class=CapturingDisplayPublisher)

@@ -26,7 +26,7 @@ PART = 0.6
 
 
 @pytest.mark.parametrize("lesson", sorted(STORED))
-def test_the_engine_confirms_the_stored_maps(lesson: str) -> None:
+def test_the_engine_confirms_the_stored_maps(lesson):
     recovery = measured_push_recovery(lesson)
     outcomes = []
     for factor in (PART, 1 / PART):
@@ -44,14 +44,14 @@ def test_the_engine_confirms_the_stored_maps(lesson: str) -> None:
     assert outcomes[0] == "completed" != outcomes[1]
 
 
-def test_a_second_map_of_a_lesson_has_its_own_controller() -> None:
+def test_a_second_map_of_a_lesson_has_its_own_controller():
     assert controller_factory("09 standing")().stepping_gait is None
     assert controller_factory("09")().stepping_gait is not None
     assert len(plot_push_recovery("09 standing").get_lines()) == 1
     plt.close("all")
 
 
-def test_unknown_maps_and_controllers_are_refused() -> None:
+def test_unknown_maps_and_controllers_are_refused():
     with pytest.raises(InputError, match="no push-recovery map"):
         measured_push_recovery("00")
     for name in ("00", "09 flying"):

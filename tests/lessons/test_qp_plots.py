@@ -43,7 +43,7 @@ def random_qp(seed: int) -> QP:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed: int) -> None:
+def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed):
     qp = random_qp(seed)
     corners = qp_plots.feasible_polygon(qp, BOX)
     assert np.all(corners @ qp.G.T <= qp.h + 1e-9)
@@ -55,7 +55,7 @@ def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed
         assert inside == (len(corners) > 2 and bool(np.all(turns >= 0.0)))
 
 
-def test_infeasible_constraints_have_no_polygon() -> None:
+def test_infeasible_constraints_have_no_polygon():
     assert (
         len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX))
         == 0
@@ -63,9 +63,7 @@ def test_infeasible_constraints_have_no_polygon() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_normals_times_multipliers_add_up_to_the_negative_gradient(
-    seed: int,
-) -> None:
+def test_normals_times_multipliers_add_up_to_the_negative_gradient(seed):
     qp = random_qp(seed)
     try:
         x = solve(qp).x
@@ -81,7 +79,7 @@ def test_normals_times_multipliers_add_up_to_the_negative_gradient(
     plt.close("all")
 
 
-def test_a_level_curve_has_one_value_of_the_cost() -> None:
+def test_a_level_curve_has_one_value_of_the_cost():
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
     for qp in (
         qp_of(H, [1.0, -0.5], [], []),
@@ -97,7 +95,7 @@ def test_a_level_curve_has_one_value_of_the_cost() -> None:
     plt.close("all")
 
 
-def test_only_problems_in_the_plane_are_accepted() -> None:
+def test_only_problems_in_the_plane_are_accepted():
     with raises(InputError, "QP", 3):
         qp_plots.plot(
             QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))

@@ -45,7 +45,7 @@ def settled(name: str, day: float, right: bool, sure: bool | None = None) -> dic
     return {name: entry | ({} if sure is None else {"sure": sure})}
 
 
-def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read() -> None:
+def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read():
     known = all_questions()
     assert len(RECALLED) >= 40
     assert len(known) > 140
@@ -56,7 +56,7 @@ def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read(
         assert "**" not in text and "Predict" not in text
 
 
-def test_four_weeks_of_a_learner(home: Path) -> None:
+def test_four_weeks_of_a_learner(home):
     """A learner who knows two of three answers works through a lesson now and then."""
     random = np.random.default_rng(1)
     known = all_questions()
@@ -94,16 +94,14 @@ def test_four_weeks_of_a_learner(home: Path) -> None:
     ("right", "sure", "hours"),
     [(True, None, 48), (False, None, 24), (False, True, 12), (True, True, 48)],
 )
-def test_a_question_rests_according_to_its_last_answer(
-    home: Path, right: bool, sure: bool | None, hours: int
-) -> None:
+def test_a_question_rests_according_to_its_last_answer(home, right, sure, hours):
     write(home, [settled("02.d", 0, right, sure)])
     for off, asked in ((-1, []), (1, ["02.d"])):
         now = START + timedelta(hours=hours + off)
         assert [question.name for question in due_questions(now)] == asked
 
 
-def test_right_answers_double_the_pause(home: Path) -> None:
+def test_right_answers_double_the_pause(home):
     entries, day = [settled("02.d", 0, True)], 2.0
     for pause in (4.0, 8.0, 16.0):
         time = (START + timedelta(days=day)).isoformat()
@@ -114,14 +112,14 @@ def test_right_answers_double_the_pause(home: Path) -> None:
         day += pause
 
 
-def test_what_was_missed_comes_first_and_lessons_are_mixed(home: Path) -> None:
+def test_what_was_missed_comes_first_and_lessons_are_mixed(home):
     names = ["01.a", "01.b", "01.d", "02.d", "03.h"]
     write(home, [settled(name, 0, name != "03.h") for name in names])
     asked = [question.name for question in due_questions(START + timedelta(days=5))]
     assert asked == ["03.h", "01.a", "02.d"]
 
 
-def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home: Path) -> None:
+def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home):
     """Lesson A needs lessons 01 and 02 only, so a learner may open it right after these."""
     known = all_questions()
     entries = [settled(name, 0, False) for name in known if known[name].lesson in ("01", "02")]
@@ -133,7 +131,7 @@ def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home: Path) -
     assert {question.lesson for question in asked} == {"01", "02"}
 
 
-def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_answers_are_told_and_kept(home, capsys):
     recall()
     assert "nothing to recall" in capsys.readouterr().out
     predict("02.d", 10, unit="N")
@@ -156,9 +154,7 @@ def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str
     assert progress.predictions()["02.d"]["said"] == 10  # predictions stay as they were
 
 
-def test_the_command_asks_what_is_due(
-    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_asks_what_is_due(home, monkeypatch, capsys):
     entry = {"said": 5, "is": [18, 12], "unit": "", "time": "2026-01-01T00:00:00+00:00"}
     guess = {"01.e": {"said": "true", "is": "false"}}
     write(home, [{"01.d": entry}, settled("02.d", -60, False), guess])
@@ -201,7 +197,7 @@ def time_of(day: float) -> str:
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-def test_the_site_asks_what_recall_asks(home: Path) -> None:
+def test_the_site_asks_what_recall_asks(home):
     """due.js and `due_questions` on the same forty histories."""
     random = np.random.default_rng(2)
     data = site.recall.recall_data([])
@@ -226,7 +222,7 @@ def test_the_site_asks_what_recall_asks(home: Path) -> None:
     assert json.loads(ran.stdout) == expected
 
 
-def test_the_page_knows_every_question_and_its_result() -> None:
+def test_the_page_knows_every_question_and_its_result():
     data = site.recall.recall_data([NOTEBOOKS / "02_equations_of_motion.ipynb"])
     assert list(data["questions"]) == RECALLED
     for name, question in data["questions"].items():
@@ -236,7 +232,7 @@ def test_the_page_knows_every_question_and_its_result() -> None:
         assert question["address"] == in_02
 
 
-def test_damaged_times_and_answers_do_no_harm(home: Path) -> None:
+def test_damaged_times_and_answers_do_no_harm(home):
     for time in ("", "x", 5, None, "9999-12-31T23:59"):
         write(home, [{"02.d": {"said": 1.0, "is": 2.0, "unit": "N", "time": time}}])
         due_questions()

@@ -50,7 +50,7 @@ LESSONS = sorted({question.lesson for question in all_questions().values()})
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
-def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson: str) -> None:
+def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson):
     results = site.results(read_notebook(lesson_notebooks()[lesson]).cells)
     asked = [question for question in all_questions().values() if question.lesson == lesson]
     forms = [site.prediction_form(question, results[question.name]) for question in asked]
@@ -73,14 +73,12 @@ def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson:
         (Question("11.a", "", "", ""), None),  # not a number
     ],
 )
-def test_a_result_that_answers_another_question_makes_no_form(
-    question: Question, result: Any
-) -> None:
+def test_a_result_that_answers_another_question_makes_no_form(question, result):
     assert site.prediction_form(question, None) is None
     assert site.prediction_form(question, {"result": result, "shown": ""}) is None
 
 
-def test_exercises_of_a_few_numbers_have_a_form_and_the_judges_own_hints() -> None:
+def test_exercises_of_a_few_numbers_have_a_form_and_the_judges_own_hints():
     exercises = {}
     for name, exercise in all_exercises().items():
         if name in ("00.1", "01.1", "03.2", "09.2", "C.1"):
@@ -130,9 +128,7 @@ def fill(form: Any, kind: str) -> str:
 
 
 @pytest.mark.front_end
-def test_a_reader_answers_lesson_03_reloads_and_hands_in(
-    page: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reader_answers_lesson_03_reloads_and_hands_in(page, tmp_path, monkeypatch, capsys):
     forms = page.locator(".answers-prediction form")
     names = [name for name, question in all_questions().items() if question.lesson == "03"]
     assert forms.count() == len(names)
@@ -198,9 +194,7 @@ def recalling(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterato
 
 
 @pytest.mark.front_end
-def test_a_reader_recalls_with_the_keyboard(
-    recalling: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_reader_recalls_with_the_keyboard(recalling, tmp_path, monkeypatch):
     page, box = recalling, recalling.locator(".answers-recall")
     assert "some days after" in box.inner_text()
     said = {"01.d": [1, 2], "01.e": "true", "02.c": "they stay", "02.d": 43.1}
@@ -247,9 +241,7 @@ def test_a_reader_recalls_with_the_keyboard(
     assert [question.name for question in due_questions()] == ["01.e", "02.d"]
 
 
-def test_only_answers_of_the_course_are_imported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_only_answers_of_the_course_are_imported(tmp_path, monkeypatch):
     """A file may set neither an id nor a solved exercise; a result completes a prediction."""
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
     progress.append("02.d", {"said": 43.1})  # without its result
@@ -272,8 +264,8 @@ def test_only_answers_of_the_course_are_imported(
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"form": "answers to the floatbase course"}'])
-def test_another_file_is_not_imported(tmp_path: Path, text: str) -> None:
+def test_another_file_is_not_imported(tmp_path, text):
     (tmp_path / "a.json").write_text(text)
     for path in (tmp_path / "a.json", tmp_path / "none.json", 5):
         with pytest.raises(InputError, match="answers|read"):
-            import_answers(path)  # type: ignore[arg-type]
+            import_answers(path)

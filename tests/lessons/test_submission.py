@@ -46,7 +46,7 @@ def same(a: Any, b: Any) -> bool:
     return bool(np.array_equal(a, b))
 
 
-def test_a_file_keeps_every_kind_of_answer_to_the_last_bit() -> None:
+def test_a_file_keeps_every_kind_of_answer_to_the_last_bit():
     placeholders = {name: exercise.placeholder() for name, exercise in all_exercises().items()}
     answers = {name: answer for name, answer in placeholders.items() if not callable(answer)}
     assert len(answers) > 30
@@ -54,16 +54,14 @@ def test_a_file_keeps_every_kind_of_answer_to_the_last_bit() -> None:
     assert [name for name, answer in answers.items() if not same(answer, back[name])] == []
 
 
-def test_a_file_keeps_odd_answers_in_some_form() -> None:
+def test_a_file_keeps_odd_answers_in_some_form():
     endless: list[Any] = []
     endless.append(endless)
     for odd in [*ODD.values(), endless, np.zeros((1000, 1000)), lambda x: x]:
         json.dumps(progress.as_json(odd))
 
 
-def test_grading_judges_the_answers_and_not_the_claims_of_a_file(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_grading_judges_the_answers_and_not_the_claims_of_a_file(learner, capsys):
     for answer in (3.0, LIFTED, 4.0):
         check("00.1", answer)
     check("03.1", 5)
@@ -87,9 +85,7 @@ def test_grading_judges_the_answers_and_not_the_claims_of_a_file(
     } == {"wrong"}
 
 
-def test_hand_in_asks_to_check_again_answers_that_were_not_kept(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_hand_in_asks_to_check_again_answers_that_were_not_kept(learner, capsys):
     progress.append("00.1", {"tries": 1, "right": 1})
     progress.append("99.1", {"tries": 1, "right": 1})  # of another course
     hand_in("Ada")
@@ -100,7 +96,7 @@ def test_hand_in_asks_to_check_again_answers_that_were_not_kept(
     assert "once more" not in capsys.readouterr().out
 
 
-def test_grading_shows_code_and_never_runs_it(learner: Path) -> None:
+def test_grading_shows_code_and_never_runs_it(learner):
     ran = []
 
     def row_to_drop(W: Any, prices: Any) -> None:
@@ -125,7 +121,7 @@ HOSTILE = (
 
 
 @pytest.mark.parametrize("kept", HOSTILE, ids=range(len(HOSTILE)))
-def test_grading_accepts_an_answer_of_any_form(learner: Path, kept: Any) -> None:
+def test_grading_accepts_an_answer_of_any_form(learner, kept):
     entry = {"tries": 1, "right": 1, "answer": kept}
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
@@ -149,7 +145,7 @@ NO_FILE = (
 
 
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
-def test_grading_refuses_files_that_hand_in_did_not_write(learner: Path, text: str) -> None:
+def test_grading_refuses_files_that_hand_in_did_not_write(learner, text):
     (learner / "a.json").write_text(text)
     with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
@@ -157,7 +153,7 @@ def test_grading_refuses_files_that_hand_in_did_not_write(learner: Path, text: s
         grades.grade_file(learner / "none.json")
 
 
-def test_hand_in_needs_an_answer_a_name_and_a_folder(learner: Path) -> None:
+def test_hand_in_needs_an_answer_a_name_and_a_folder(learner):
     with pytest.raises(InputError, match="nothing to hand in yet"):
         hand_in("Ada")
     check("00.1", 3.0)
@@ -169,7 +165,7 @@ def test_hand_in_needs_an_answer_a_name_and_a_folder(learner: Path) -> None:
     assert hand_in("../../Ada").parent == Path(".")
 
 
-def test_a_class_becomes_one_table(learner: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_class_becomes_one_table(learner, capsys):
     check("00.1", LIFTED)
     files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1", "a;=2")]
     (learner / "holiday.json").write_text("{}")
@@ -188,9 +184,7 @@ def test_a_class_becomes_one_table(learner: Path, capsys: pytest.CaptureFixture[
         grades.grade_files([learner / "holiday.json"])
 
 
-def test_a_pipe_or_a_device_among_the_files_is_reported(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pipe_or_a_device_among_the_files_is_reported(learner, capsys):
     check("00.1", LIFTED)
     os.mkfifo(learner / "pipe.json")
     (learner / "zero.json").symlink_to("/dev/zero")
@@ -202,7 +196,7 @@ def test_a_pipe_or_a_device_among_the_files_is_reported(
     }
 
 
-def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None:
+def test_learners_with_similar_names_keep_their_own_files(learner):
     check("00.1", LIFTED)
     (learner / "answers-A_B.json").write_text("notes")
     names = ["A.B", "A B", "A_B"]
@@ -216,9 +210,7 @@ def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None
     assert hand_in("Eve").name == "answers-Eve-3.json"
 
 
-def test_learners_with_similar_names_can_hand_in_at_once(
-    learner: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_learners_with_similar_names_can_hand_in_at_once(learner, monkeypatch):
     check("00.1", LIFTED)
     submission = sys.modules[hand_in.__module__]
     write = submission.write_whole
@@ -235,13 +227,13 @@ def test_learners_with_similar_names_can_hand_in_at_once(
 
 
 @pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
-def test_hand_in_refuses_a_folder_that_is_no_path(learner: Path, folder: Any) -> None:
+def test_hand_in_refuses_a_folder_that_is_no_path(learner, folder):
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):
         hand_in("Ada", folder)
 
 
-def test_the_last_of_two_files_of_a_learner_counts(learner: Path) -> None:
+def test_the_last_of_two_files_of_a_learner_counts(learner):
     check("00.1", LIFTED)
     files = []
     for time in ("2026-05-02T10:00:00+00:00", "2026-05-01T10:00:00+00:00"):
@@ -258,7 +250,7 @@ def test_the_last_of_two_files_of_a_learner_counts(learner: Path) -> None:
         assert {one.file for one in found} == kept
 
 
-def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner: Path) -> None:
+def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner):
     for answer in (1.0, 2.0):
         check("00.1", answer)
     assert progress.answers() == {"00.1": 2.0}
@@ -267,7 +259,7 @@ def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner: Path) -> N
     assert progress.answers() == {"00.1": LIFTED}
 
 
-def test_lessons_for_teachers_hold_the_solutions(learner: Path) -> None:
+def test_lessons_for_teachers_hold_the_solutions(learner):
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     path = learner / "solutions" / f"{lesson.stem}.solved.ipynb"
     assert write_solutions(path.parent, [lesson]) == [f"{path.name}: new"]
@@ -280,7 +272,7 @@ def test_lessons_for_teachers_hold_the_solutions(learner: Path) -> None:
     assert len(cells) == len(read_notebook(lesson).cells) + explained
 
 
-def test_annotated_solutions_are_kept(learner: Path) -> None:
+def test_annotated_solutions_are_kept(learner):
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     write_solutions(learner, [lesson])
     assert write_solutions(learner, [lesson]) == []
@@ -296,7 +288,7 @@ def test_annotated_solutions_are_kept(learner: Path) -> None:
     assert (learner / f"{lesson.stem}.solved.new.ipynb").read_text() != annotated
 
 
-def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
+def test_a_table_replaces_only_an_earlier_table(learner):
     """`grade --table *.json`, without the name of the table, must not cost a learner's answers."""
     check("00.1", 3.0)
     answers, table = hand_in("Ada"), learner / "marks.csv"
@@ -309,7 +301,7 @@ def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
     assert len(table.read_text().splitlines()) > len(all_exercises())
 
 
-def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner: Path) -> None:
+def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner):
     check("00.1", 3.0)
     path = hand_in("Ada")
     kept = path.read_bytes()
@@ -329,9 +321,7 @@ def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner: Path) -> 
         ["grade", "text", "--before", "9999-12-31T23:59"],
     ],
 )
-def test_the_command_line_ends_with_a_message_and_no_traceback(
-    learner: Path, arguments: list[str]
-) -> None:
+def test_the_command_line_ends_with_a_message_and_no_traceback(learner, arguments):
     (learner / "text").write_text("no notebook")
     with pytest.raises(SystemExit) as ended:
         main(arguments)

@@ -55,13 +55,13 @@ def update(course: Path, n: int = 2) -> None:
     (course / "page.md").write_text(f"a page, {n}")
 
 
-def test_a_copy_has_no_outputs(course: Path) -> None:
+def test_a_copy_has_no_outputs(course):
     write(course / LESSON, "first = 1", output="1\n")
     prepare_workspace(course)
     assert nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells[0].outputs == []
 
 
-def test_a_copy_keeps_predictions_and_folded_claims(course: Path) -> None:
+def test_a_copy_keeps_predictions_and_folded_claims(course):
     question = new_code_cell(
         'predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"}
     )
@@ -88,16 +88,14 @@ def test_a_copy_keeps_predictions_and_folded_claims(course: Path) -> None:
     )  # what was predicted is the learner's writing
 
 
-def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
+def test_a_lesson_is_copied_once_and_then_left_alone(course):
     assert prepare_workspace(course) == [f"{LESSON}: new"]
     write(course / MY_FOLDER / LESSON, "first = 'my answer'")
     assert prepare_workspace(course) == []
     assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
 
 
-def test_learners_of_one_installed_course_have_separate_copies(
-    course: Path, tmp_path: Path
-) -> None:
+def test_learners_of_one_installed_course_have_separate_copies(course, tmp_path):
     folders = [tmp_path / "homes" / name / "course" for name in ("ada", "bob")]
     for folder in folders:
         assert prepare_workspace(course, folder) == [f"{LESSON}: new"]
@@ -110,7 +108,7 @@ def test_learners_of_one_installed_course_have_separate_copies(
     assert not (course / MY_FOLDER).exists()
 
 
-def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path: Path) -> None:
+def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path):
     course, program = tmp_path / "notebooks", tmp_path / "examples" / "wbc.py"
     for folder in (course, program.parent):
         folder.mkdir()
@@ -120,7 +118,7 @@ def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path:
     assert (course / MY_FOLDER / "wbc.py").read_text() == program.read_text()
 
 
-def test_a_package_without_lessons_is_refused(tmp_path: Path) -> None:
+def test_a_package_without_lessons_is_refused(tmp_path):
     with pytest.raises(
         InputError,
         match=r"There are no lessons in .*notebooks\. Install floatbase from its repository",
@@ -128,7 +126,7 @@ def test_a_package_without_lessons_is_refused(tmp_path: Path) -> None:
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
 
-def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
+def test_a_newer_lesson_replaces_one_that_was_only_run(course):
     prepare_workspace(course)
     write(course / MY_FOLDER / LESSON, "first = 1", output="1\n")
     write(course / LESSON, "first = 2")
@@ -137,7 +135,7 @@ def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
 
 
 @pytest.mark.parametrize("forget", [False, True])
-def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) -> None:
+def test_newer_lessons_are_put_beside_edited_copies(mine, forget):
     """Whichever file the learner continues in, and also when the record of copies is lost."""
     write(mine / LESSON, "first = 'my answer'")
     for n, name in ((2, NEW), (3, NEW2)):
@@ -158,9 +156,7 @@ def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) ->
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(
-    mine: Path,
-) -> None:
+def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(mine):
     write(mine / LESSON, "first = 'my answer'")
     for n in (2, 3):
         update(mine.parent, n)
@@ -208,7 +204,7 @@ CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_only_edits_of_a_learner_count_as_writing(course: Path, change: str) -> None:
+def test_only_edits_of_a_learner_count_as_writing(course, change):
     counts, make = CHANGES[change]
     prepare_workspace(course)
     copy = course / MY_FOLDER / LESSON
@@ -233,7 +229,7 @@ def test_only_edits_of_a_learner_count_as_writing(course: Path, change: str) -> 
         "\0",
     ],
 )
-def test_a_damaged_record_keeps_everything_written(mine: Path, text: str) -> None:
+def test_a_damaged_record_keeps_everything_written(mine, text):
     (mine / LESSON).write_text("half a noteb")
     (mine / ".from.json").write_text(text)
     update(mine.parent)
@@ -270,9 +266,7 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(
-    mine: Path, obstacle: str
-) -> None:
+def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(mine, obstacle):
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
@@ -285,7 +279,7 @@ def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(
     assert not (mine.parent / "nowhere.ipynb").exists()
 
 
-def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
+def test_links_are_neither_followed_nor_replaced(mine):
     (mine.parent / "elsewhere").mkdir()
     for name in (LESSON, "page.md", NEW):
         kept = mine.parent / "elsewhere" / name
@@ -304,15 +298,13 @@ def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
 @pytest.mark.parametrize(
     "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
 )
-def test_a_folder_that_cannot_be_created_is_reported(
-    course: Path, make: Callable[[Path], object]
-) -> None:
+def test_a_folder_that_cannot_be_created_is_reported(course, make):
     make(course / MY_FOLDER)
     with pytest.raises(InputError, match="can write to"):
         prepare_workspace(course)
 
 
-def test_a_full_disk_keeps_whole_files_and_later_updates(mine: Path) -> None:
+def test_a_full_disk_keeps_whole_files_and_later_updates(mine):
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the record, none for the lesson
@@ -324,7 +316,7 @@ def test_a_full_disk_keeps_whole_files_and_later_updates(mine: Path) -> None:
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
 
 
-def test_a_copy_has_the_form_that_jupyter_writes(course: Path, tmp_path: Path) -> None:
+def test_a_copy_has_the_form_that_jupyter_writes(course, tmp_path):
     """So that saving without a change changes nothing."""
     prepare_workspace(course)
     copy, again = course / MY_FOLDER / LESSON, tmp_path / "again"
@@ -332,7 +324,7 @@ def test_a_copy_has_the_form_that_jupyter_writes(course: Path, tmp_path: Path) -
     assert copy.read_text(encoding="utf-8") == again.read_text(encoding="utf-8")
 
 
-def test_preparing_a_workspace_imports_no_heavy_package() -> None:
+def test_preparing_a_workspace_imports_no_heavy_package():
     heavy = ("mujoco", "meshcat", "matplotlib", "ipywidgets", "nbformat", "nbclient", "mistune")
     code = (
         f"import sys, floatbase.lessons.publish.__main__; print([m for m in {heavy} if m in "

@@ -85,13 +85,13 @@ def play(challenge: Challenge, script: list[tuple[float, Act]], seconds: float =
 
 
 @pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
-def test_a_challenge_can_be_solved(challenge: Challenge) -> None:
+def test_a_challenge_can_be_solved(challenge):
     judge = play(challenge, SOLUTIONS[challenge.title])
     assert judge.won and judge.message.startswith("Solved"), judge.message
 
 
 @pytest.mark.parametrize("challenge", CHALLENGES, ids=lambda challenge: challenge.title)
-def test_waiting_does_not_win(challenge: Challenge) -> None:
+def test_waiting_does_not_win(challenge):
     judge = play(challenge, [], 3.0)
     assert not judge.won and judge.message
 
@@ -101,7 +101,7 @@ def test_waiting_does_not_win(challenge: Challenge) -> None:
     [challenge for challenge in CHALLENGES if "mass" in challenge.locked],
     ids=lambda challenge: challenge.title,
 )
-def test_a_changed_locked_setting_is_noticed(challenge: Challenge) -> None:
+def test_a_changed_locked_setting_is_noticed(challenge):
     judge = play(challenge, [(0.0, change(mass=(1.0, 0.9))), *SOLUTIONS[challenge.title]], 2.0)
     assert not judge.won and "mass" in judge.message
 
@@ -119,7 +119,7 @@ NEARLY = {
 
 
 @pytest.mark.parametrize("title", NEARLY)
-def test_a_near_solution_does_not_win(title: str) -> None:
+def test_a_near_solution_does_not_win(title):
     challenge = BY_TITLE[title]
     judge = play(challenge, NEARLY[title], 4.0)
     assert not judge.won, judge.message
@@ -158,14 +158,14 @@ CHEATS = {
 
 
 @pytest.mark.parametrize("how", CHEATS)
-def test_a_trick_does_not_win(how: str) -> None:
+def test_a_trick_does_not_win(how):
     title, script = CHEATS[how]
     judge = play(BY_TITLE[title], script, 7.0)
     assert not judge.won, judge.message
 
 
 @pytest.mark.parametrize("title", BY_TITLE)
-def test_a_judge_watches_a_robot_whose_stance_changes(title: str) -> None:
+def test_a_judge_watches_a_robot_whose_stance_changes(title):
     lift, lower = change(lifted_feet=("FL_foot",)), change(lifted_feet=())
     judge = play(
         BY_TITLE[title],
@@ -175,7 +175,7 @@ def test_a_judge_watches_a_robot_whose_stance_changes(title: str) -> None:
     assert judge.message
 
 
-def test_a_push_of_300_n_counts_in_every_direction() -> None:
+def test_a_push_of_300_n_counts_in_every_direction():
     judge, session = (
         BY_TITLE["Survive 300 N"].judge(),
         Session(GO2),

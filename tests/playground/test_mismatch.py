@@ -38,7 +38,7 @@ def solved(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed: int) -> None:
+def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed):
     state = moving(seed)
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     heavy, data = state.robot.model.copy(), state.robot.model.createData()
@@ -70,7 +70,7 @@ def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed: int) -> None
     )
 
 
-def test_the_default_is_exact_and_changes_nothing() -> None:
+def test_the_default_is_exact_and_changes_nothing():
     state = moving()
     controller = judges.controller_of("go2")
     qp, eom = controller.qp(state), fb.equations_of_motion(state, controller.contacts)
@@ -78,13 +78,13 @@ def test_the_default_is_exact_and_changes_nothing() -> None:
     assert not ModelMismatch(drift=False).is_exact
 
 
-def test_a_plan_without_drift_has_zero_a_qdd() -> None:
+def test_a_plan_without_drift_has_zero_a_qdd():
     eom, x = solved(ModelMismatch(drift=False), moving())
     assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
     assert np.abs(eom.b).max() > 0.1  # m/s²: the neglected drift
 
 
-def test_an_ignored_contact_exerts_no_force_in_the_plan() -> None:
+def test_an_ignored_contact_exerts_no_force_in_the_plan():
     eom, x = solved(ModelMismatch(ignored_contacts=["FR_foot"]), moving())
     part = eom.contacts.force_slice("FR_foot")
     others = np.array(x["forces"])
@@ -94,7 +94,7 @@ def test_an_ignored_contact_exerts_no_force_in_the_plan() -> None:
     )
 
 
-def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows() -> None:
+def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows():
     eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
@@ -103,7 +103,7 @@ def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows() -> None:
     )
 
 
-def test_feet_pull_in_a_plan_without_cones() -> None:
+def test_feet_pull_in_a_plan_without_cones():
     robot, down = judges.load("go2"), np.array([0.0, 0.0, -30.0])
     state, contacts = robot.standing(), judges.stance(robot)
     tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
@@ -117,7 +117,7 @@ def test_feet_pull_in_a_plan_without_cones() -> None:
     assert normals[False].sum() == pytest.approx(robot.mass * (9.81 - 30.0), rel=0.2)
 
 
-def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
+def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk():
     robot, mismatch = judges.load("go2"), ModelMismatch(mass=1.1)
     controller = fb.WholeBodyController(
         robot, judges.stance(robot), fb.standing_tasks(robot.standing()), modify_qp=mismatch
@@ -135,7 +135,7 @@ def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
 
 
-def test_a_single_name_is_refused_and_the_error_shows_a_list() -> None:
+def test_a_single_name_is_refused_and_the_error_shows_a_list():
     refused(
         lambda: ModelMismatch(ignored_contacts="FR_foot"),
         InputError,

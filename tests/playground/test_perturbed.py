@@ -32,7 +32,7 @@ def in_the_air(sim: PerturbedSimulation, omega: float = 0.0) -> None:
     sim.reset(state.replace(q=q, v=v))
 
 
-def test_an_unperturbed_simulation_equals_the_plain_one() -> None:
+def test_an_unperturbed_simulation_equals_the_plain_one():
     plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
@@ -42,7 +42,7 @@ def test_an_unperturbed_simulation_equals_the_plain_one() -> None:
     assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
 
 
-def test_the_robot_falls_with_gravity_and_floats_without_it() -> None:
+def test_the_robot_falls_with_gravity_and_floats_without_it():
     for gravity in (True, False):
         sim = PerturbedSimulation(GO2, perturbation=Perturbation(gravity=gravity))
         in_the_air(sim)
@@ -51,7 +51,7 @@ def test_the_robot_falls_with_gravity_and_floats_without_it() -> None:
         assert sim.state.com_velocity[2] == pytest.approx(-0.2 * G * gravity, abs=1e-3)
 
 
-def test_the_ground_carries_the_actual_mass() -> None:
+def test_the_ground_carries_the_actual_mass():
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(mass=1.2))
     record = standing(sim)
     assert record.outcome == "completed"
@@ -62,14 +62,14 @@ def test_the_ground_carries_the_actual_mass() -> None:
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
 
 
-def test_a_disabled_contact_carries_nothing() -> None:
+def test_a_disabled_contact_carries_nothing():
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(disabled_contacts=["FL_foot"]))
     record = standing(sim, seconds=0.1)
     assert not record.measured.reshape(len(record), -1, 3)[:, 0].any()
     assert record.measured.reshape(len(record), -1, 3)[-1, 1:].any()
 
 
-def test_a_spinning_robot_keeps_its_velocity_without_velocity_forces() -> None:
+def test_a_spinning_robot_keeps_its_velocity_without_velocity_forces():
     """Without gravity, torques and velocity forces, all velocities are constant."""
     change = {}
     for kept in (True, False):
@@ -85,7 +85,7 @@ def test_a_spinning_robot_keeps_its_velocity_without_velocity_forces() -> None:
     assert change[True] > 0.05
 
 
-def test_a_base_keeps_its_velocity_along_its_own_axes_without_velocity_forces() -> None:
+def test_a_base_keeps_its_velocity_along_its_own_axes_without_velocity_forces():
     """With M q̈ = 0 in the base's own axes, a rotating base flies along a curve."""
     sim = PerturbedSimulation(
         GO2, timestep=1e-4, perturbation=Perturbation(gravity=False, velocity_forces=False)
@@ -101,7 +101,7 @@ def test_a_base_keeps_its_velocity_along_its_own_axes_without_velocity_forces() 
     assert np.abs(sim.v - v).max() < 0.02 * turned
 
 
-def test_adhesion_lets_the_ground_pull() -> None:
+def test_adhesion_lets_the_ground_pull():
     """Feet with adhesion stay on the ground although the robot is pulled up with 1.5 weights."""
     up = 1.5 * GO2.weight
     nets = {}
@@ -123,7 +123,7 @@ def test_adhesion_lets_the_ground_pull() -> None:
     assert nets[GO2.weight] < -0.2 * GO2.weight
 
 
-def test_adhesion_acts_from_the_first_touch() -> None:
+def test_adhesion_acts_from_the_first_touch():
     """Newton's law holds at each timestep of a landing; measured forces include adhesion."""
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(adhesion_force=GO2.weight))
     state = GO2.standing()
@@ -139,7 +139,7 @@ def test_adhesion_acts_from_the_first_touch() -> None:
     )  # the adhesion of one foot is a whole weight
 
 
-def test_motors_of_the_base_lift_it() -> None:
+def test_motors_of_the_base_lift_it():
     sim = PerturbedSimulation(GO2)
     in_the_air(sim)
     R = sim.state.frame_pose("base").rotation
@@ -151,7 +151,7 @@ def test_motors_of_the_base_lift_it() -> None:
     assert not sim.base_wrench.any()
 
 
-def test_friction_can_change_during_a_run() -> None:
+def test_friction_can_change_during_a_run():
     sim = PerturbedSimulation(GO2, 0.8)
     assert standing(sim, seconds=0.2).outcome == "completed"
     sim.perturbation = Perturbation(friction=0.05)
@@ -166,7 +166,7 @@ def test_friction_can_change_during_a_run() -> None:
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 
 
-def test_links_of_a_fallen_robot_have_the_friction_of_the_perturbation() -> None:
+def test_links_of_a_fallen_robot_have_the_friction_of_the_perturbation():
     sim = PerturbedSimulation(GO2, 0.8)
     sim.link_collisions = True
     sim.perturbation = Perturbation(friction=0.05)
@@ -178,7 +178,7 @@ def test_links_of_a_fallen_robot_have_the_friction_of_the_perturbation() -> None
     assert touching - set(sim.foot_contacts.geoms.tolist())
 
 
-def test_copies_are_independent_and_wrong_input_is_refused() -> None:
+def test_copies_are_independent_and_wrong_input_is_refused():
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(velocity_forces=False))
     other = copy.copy(sim)
     other.perturbation = Perturbation(mass=2.0)
