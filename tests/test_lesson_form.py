@@ -158,7 +158,7 @@ def test_assertions_are_in_folded_cells_without_output(path):
         body = ast.parse(cell.source).body
         fits = {
             "asserts outside of its claims": not asserts(cell)
-            or any(tagged(cell, t) for t in ("claims", "exercise", "check")),
+            or any(tagged(cell, t) for t in ("claims", "exercise", "check"))
         }
         if tagged(cell, "claims"):
             fits |= {

@@ -20,12 +20,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 from panels import moved_sliders
 
 from floatbase.lessons import all_exercises, check, progress
-from floatbase.lessons.publish import (
-    NOTEBOOKS,
-    read_notebook,
-    run_and_store,
-    with_solutions,
-)
+from floatbase.lessons.publish import NOTEBOOKS, read_notebook, run_and_store, with_solutions
 
 HOME = 'os.environ["FLOATBASE_HOME"]'
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))

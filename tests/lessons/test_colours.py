@@ -9,12 +9,7 @@ from pathlib import Path
 
 import floatbase as fb
 from floatbase.lessons.publish import NOTEBOOKS, read_notebook
-from floatbase.viewer.scene.colours import (
-    ALARM,
-    CALM,
-    CONE,
-    WARNING,
-)
+from floatbase.viewer.scene.colours import ALARM, CALM, CONE, WARNING
 
 LESSONS = Path(fb.__file__).parent / "lessons"
 CODE = r"(?<!&)#(?:[0-9A-Fa-f]{6}|[0-9A-Fa-f]{3})\b"

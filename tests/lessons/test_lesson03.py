@@ -7,11 +7,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.dynamics import dimensions
-from floatbase.lessons.lesson03 import (
-    beta_direction,
-    rising_solo8_eom,
-    upright_solo12,
-)
+from floatbase.lessons.lesson03 import beta_direction, rising_solo8_eom, upright_solo12
 
 GO2 = fb.load("go2")
 # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below

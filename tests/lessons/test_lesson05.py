@@ -19,12 +19,7 @@ from floatbase.lessons.lesson05 import (
     moving_and_goal_state,
     stretched_arm_state,
 )
-from floatbase.objectives import (
-    com_wrench_map,
-    normal_bias,
-    tangential_bias,
-    wrench_objective,
-)
+from floatbase.objectives import com_wrench_map, normal_bias, tangential_bias, wrench_objective
 
 GO2 = fb.load("go2")
 EOM = standing_go2_eom()

@@ -10,12 +10,7 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.lessonA import (
-    elliptic_rotation,
-    figure_of_eight,
-    show_tumble,
-    tool_error,
-)
+from floatbase.lessons.lessonA import elliptic_rotation, figure_of_eight, show_tumble, tool_error
 
 
 def test_the_figure_of_eight_is_closed_and_its_rates_are_its_derivatives():

@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from floatbase.actuators import Cylinders, HydraulicActuators, Hydraulics
-from floatbase.lessons.lessonB import (
-    Bench,
-    hold_then_turn,
-    push_response,
-    run_force_loop,
-)
+from floatbase.lessons.lessonB import Bench, hold_then_turn, push_response, run_force_loop
 
 ROBOT = judges.load("go2")
 KNEE = ROBOT.joint_names.index("FL_calf_joint")

@@ -11,11 +11,7 @@ import pytest
 import floatbase as fb
 from floatbase import lessons
 from floatbase.errors import InputError
-from floatbase.lessons import (
-    controller_factory,
-    measured_push_recovery,
-    plot_push_recovery,
-)
+from floatbase.lessons import controller_factory, measured_push_recovery, plot_push_recovery
 
 STORED = json.loads(
     (Path(lessons.__file__).parent / "push_recovery.json").read_text(encoding="utf-8")

@@ -218,16 +218,7 @@ def test_only_edits_of_a_learner_count_as_writing(course, change):
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "null",
-        "5",
-        "[1]",
-        '{"00_a.ipynb": [1]}',
-        "[" * 100_000,
-        "",
-        "\0",
-    ],
+    "text", ["null", "5", "[1]", '{"00_a.ipynb": [1]}', "[" * 100_000, "", "\0"]
 )
 def test_a_damaged_record_keeps_everything_written(mine, text):
     (mine / LESSON).write_text("half a noteb")

@@ -167,19 +167,12 @@ def test_a_trick_does_not_win(how):
 @pytest.mark.parametrize("title", BY_TITLE)
 def test_a_judge_watches_a_robot_whose_stance_changes(title):
     lift, lower = change(lifted_feet=("FL_foot",)), change(lifted_feet=())
-    judge = play(
-        BY_TITLE[title],
-        [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)],
-        0.9,
-    )
+    judge = play(BY_TITLE[title], [(0.1, push(12.0, 0.0)), (0.3, lift), (0.6, lower)], 0.9)
     assert judge.message
 
 
 def test_a_push_of_300_n_counts_in_every_direction():
-    judge, session = (
-        BY_TITLE["Survive 300 N"].judge(),
-        Session(GO2),
-    )
+    judge, session = (BY_TITLE["Survive 300 N"].judge(), Session(GO2))
     record = fb.rollout(session.sim, session.controller, 0.008, control_period=4e-3)
     for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
         judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
