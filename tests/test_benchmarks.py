@@ -25,11 +25,8 @@ import soak  # noqa: E402
 
 
 def test_the_friction_rows_are_those_of_the_peers():
-    qp = (
-        peer_problems.problem("go2", "tsid")
-        .controller("reference")
-        .qp(peer_problems.problem("go2", "tsid").robot.standing())
-    )
+    problem = peer_problems.problem("go2", "tsid")
+    qp = problem.controller("reference").qp(problem.robot.standing())
     rows = qp.G[:4, qp.blocks["forces"]][:, :3]
     mu = peer_problems.MU
     expected = [[1, 0, -mu], [0, 1, -mu], [-1, 0, -mu], [0, -1, -mu]]
@@ -56,9 +53,8 @@ def test_a_process_gives_the_torques_of_its_controller():
     assert process.ask("problem", problem.description) == "done"
     process.ask("states", {"some": [(q.tolist(), v.tolist()) for q, v in states]})
     controller = problem.controller("reference")
-    assert np.allclose(
-        process.ask("torques", "some"), [controller(q, v).tau for q, v in states], atol=1e-9
-    )
+    expected = [controller(q, v).tau for q, v in states]
+    assert np.allclose(process.ask("torques", "some"), expected, atol=1e-9)
     assert len(process.ask("clock", "some")) == 2 and min(process.ask("clock", "some")) > 0
     process.close()
 
@@ -83,12 +79,10 @@ def test_a_process_that_ends_says_why(tmp_path):
 @pytest.mark.parametrize("name", soak.SOAKS)
 def test_a_short_soak_holds(name, monkeypatch):
     monkeypatch.setattr(soak, "SAMPLES", 2)
-    monkeypatch.setitem(
-        soak.LIMITS, "memory, MB", 200.0
-    )  # so few times show no leak, only what is loaded late
-    monkeypatch.setattr(
-        soak, "SLOWED", 100.0
-    )  # few pictures on a busy machine: only one that waits for a page is told
+    # so few times show no leak, only what is loaded late
+    monkeypatch.setitem(soak.LIMITS, "memory, MB", 200.0)
+    # few pictures on a busy machine: only one that waits for a page is told
+    monkeypatch.setattr(soak, "SLOWED", 100.0)
     monkeypatch.setattr(soak, "PACE", 0.0)  # nor does a busy machine keep real time
     row = soak.run(name, 3)
     assert (row.name, row.times, row.broken) == (name, 3, "")
@@ -100,9 +94,8 @@ def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
 
     def leaking():
         def step():
-            fresh = mmap.mmap(
-                -1, 2_000_000
-            )  # an array might take memory that other tests have freed
+            # an array might take memory that other tests have freed
+            fresh = mmap.mmap(-1, 2_000_000)
             fresh.write(b"x" * len(fresh))
             kept.append((fresh, socket.socket()))
 
@@ -118,11 +111,8 @@ def test_a_soak_tells_what_stays_and_what_breaks(monkeypatch):
     monkeypatch.setattr(soak, "SOAKS", {"leaking": (leaking, 20), "breaks": (breaks, 20)})
     found = soak.run("leaking", 20)
     kept.clear()
-    assert (
-        "memory, MB: +" in found.broken
-        and "descriptors: +" in found.broken
-        and "threads" not in found.broken
-    )
+    assert "memory, MB: +" in found.broken and "descriptors: +" in found.broken
+    assert "threads" not in found.broken
     assert soak.run("breaks", 20).broken == "it broke"
     fine = soak.Row("fine", 20, 1.0, found.values, found.growth, "")
     assert [line.count("holds") for line in soak.table([found, fine])] == [0, 0, 0, 1]

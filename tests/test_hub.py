@@ -99,29 +99,21 @@ class Hub(NamedTuple):
     def kernels(self, student: str) -> list[psutil.Process]:
         """The kernels of a student."""
         home = str(self.folder / student)
-        started = [
-            child
-            for child in self.process.children(recursive=True)
-            if "ipykernel_launcher" in " ".join(child.cmdline())
-        ]
-        return [kernel for kernel in started if kernel.environ().get("HOME") == home]
+        all_ = self.process.children(recursive=True)
+        kernels = [child for child in all_ if "ipykernel_launcher" in " ".join(child.cmdline())]
+        return [kernel for kernel in kernels if kernel.environ().get("HOME") == home]
 
     def ports(self, student: str) -> list[int]:
         """The ports that the processes of a student listen on, without those of kernels."""
         home = str(self.folder / student)
-        servers = [
-            child for child in self.process.children() if child.environ().get("HOME") == home
-        ]
+        servers = [one for one in self.process.children() if one.environ().get("HOME") == home]
         return [port for server in servers for port in listening(server)]
 
 
 def listening(process: psutil.Process) -> list[int]:
     """The ports that a process listens on."""
-    return [
-        found.laddr.port
-        for found in process.net_connections("inet")
-        if found.status == psutil.CONN_LISTEN
-    ]
+    found = process.net_connections("inet")
+    return [one.laddr.port for one in found if one.status == psutil.CONN_LISTEN]
 
 
 @pytest.fixture(scope="module")
@@ -205,9 +197,8 @@ def test_no_port_of_a_students_kernel_tells_anything(hub, class_):
     for student in class_:
         (kernel,) = hub.kernels(student.name)
         ports = listening(kernel)
-        assert (
-            len(ports) <= 1
-        )  # ipykernel's own, which only receives: what processes print that cells have started
+        # ipykernel's own, which only receives: what processes print that cells have started
+        assert len(ports) <= 1
         for port in ports:
             with pytest.raises((OSError, HTTPException)):
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2.0)
@@ -225,12 +216,8 @@ def test_a_student_gets_nothing_of_another_ones(hub, class_):
     page = ada.context.new_page()
     assert page.goto(f"{hub.address}/user/{bob.name}/lab").status == 403
     assert page.locator(".jp-Notebook").count() == 0
-    for address in (
-        kernels,
-        f"{kernels}/{kernel['id']}",
-        lesson,
-        f"{hub.address}/hub/api/users/{bob.name}",
-    ):
+    user = f"{hub.address}/hub/api/users/{bob.name}"
+    for address in (kernels, f"{kernels}/{kernel['id']}", lesson, user):
         assert ada.context.request.get(address).status in (403, 404), address
     page.close()
 
@@ -240,9 +227,8 @@ def test_a_student_gets_nothing_of_another_ones(hub, class_):
     assert bob.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
     assert not ada.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
 
-    assert (
-        hub.folder / bob.name / "floatbase"
-    ).stat().st_mode & 0o077 == 0  # no other account of the machine reads it
+    # no other account of the machine reads it
+    assert (hub.folder / bob.name / "floatbase").stat().st_mode & 0o077 == 0
 
     assert hub.ports(bob.name)
     for port in hub.ports(bob.name):  # past the hub, at the server itself

@@ -45,9 +45,8 @@ def asked(cell: Any) -> list[str]:
 def calls(cell: Any, function: str) -> list[ast.Call]:
     """The calls of that function in a cell of code."""
     nodes = ast.walk(ast.parse(cell.source)) if cell.cell_type == "code" else ()
-    return [
-        node for node in nodes if isinstance(node, ast.Call) and ast.unparse(node.func) == function
-    ]
+    found = [node for node in nodes if isinstance(node, ast.Call)]
+    return [call for call in found if ast.unparse(call.func) == function]
 
 
 def named(path: Path, function: str) -> list[tuple[int, str]]:
@@ -100,11 +99,8 @@ def test_every_question_is_followed_by_an_empty_prediction(path):
             wrong.append(f"{asked(before)}: no predict(…) right below")
         for call in predicted:
             name = ast.literal_eval(call.args[0])
-            rest = [
-                line
-                for line in ast.parse(cell.source).body
-                if not isinstance(line, ast.Import | ast.ImportFrom)
-            ]
+            body = ast.parse(cell.source).body
+            rest = [line for line in body if not isinstance(line, ast.Import | ast.ImportFrom)]
             fits = {
                 "the question right above": asked(before) == [name],
                 "a cell of its own": len(rest) == 1,
@@ -115,11 +111,8 @@ def test_every_question_is_followed_by_an_empty_prediction(path):
             wrong += [f"{name}: it needs {what}" for what, fit in fits.items() if not fit]
     assert wrong == []
     for cell in cells(path):
-        assert (
-            bool(calls(cell, "predict"))
-            == tagged(cell, "predict")
-            == ("prediction" in cell.metadata)
-        ), cell.source
+        predicts = bool(calls(cell, "predict"))
+        assert predicts == tagged(cell, "predict") == ("prediction" in cell.metadata), cell.source
 
 
 @LESSONS
@@ -129,13 +122,8 @@ def test_every_prediction_is_compared_once_with_a_computed_number(path):
     assert len(compared) == len(named(path, "compare"))
     assert sorted(compared) == sorted(predicted)
     assert [name for name, i in compared.items() if i <= predicted[name]] == []
-    typed = [
-        call.args[0]
-        for cell in cells(path)
-        for call in calls(cell, "compare")
-        if is_typed(call.args[1])
-    ]
-    assert [ast.unparse(name) for name in typed] == []
+    comparing = [call for cell in cells(path) for call in calls(cell, "compare")]
+    assert [ast.unparse(call) for call in comparing if is_typed(call.args[1])] == []
 
 
 @LESSONS
@@ -210,12 +198,8 @@ def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(pat
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"
     parts = re.split(r"^#+ (?=\(|App)", the_map(), flags=re.MULTILINE)
-    here = {
-        equation
-        for equation in equations.TITLES
-        for part in parts
-        if part.startswith(f"{equation} ") and path.name in part
-    }
+    of_lesson = [part for part in parts if path.name in part]
+    here = {e for e in equations.TITLES if any(part.startswith(f"{e} ") for part in of_lesson)}
     missing = {equation for teaches, _ in taught(path) for equation in teaches} - here
     assert missing == set(), "run `python -m floatbase.lessons.publish map`"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import multiprocessing
 import re
-import resource
 import threading
 from collections import Counter
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from disk import full_disk
 from hints import LIFTED
 
 import floatbase as fb
@@ -21,10 +21,7 @@ from floatbase.lessons import all_exercises, check, progress, reveal, show_progr
 TIMES = 300  # tries of each of those who record at once
 
 
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """One who has just begun."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 def changed(answer: Any) -> Any:
@@ -138,13 +135,9 @@ def test_damage_is_left_out_and_left_as_it_is(tmp_path, text, capsys):
 def test_a_full_disk_costs_one_try(tmp_path):
     progress.record_try("00.1", True)
     stored = tmp_path / "progress.jsonl"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (stored.stat().st_size + 12, before[1]))
-    try:
-        progress.record_try("00.1", True)  # a part of the line fits
+    with full_disk(stored.stat().st_size + 12):  # a part of the line fits
         progress.record_try("00.1", True)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        progress.record_try("00.1", True)
     progress.record_try("00.1", False)
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
 

@@ -26,13 +26,7 @@ from floatbase.lessons.publish import grades
 from floatbase.lessons.publish.__main__ import main
 from floatbase.lessons.questions import all_questions
 
-
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """One who has just begun, in a folder of their own."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 def test_nine_concepts_have_three_questions_with_four_different_answers_each():

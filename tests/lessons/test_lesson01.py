@@ -20,18 +20,6 @@ def arm() -> Robot:
     return fb.load("ur5", posture=lesson01.PRESSING_POSTURE)
 
 
-def test_a_servo_follows_its_path(arm):
-    state = with_floating_base(arm).standing()
-    path = lesson01.joint_turn(joint=2, angle=0.7, duration=1.5)
-    assert np.allclose(path(0.0), 0.0)
-    assert np.allclose(path(9.0), 0.7 * np.eye(6)[2])
-    circle = lesson01.joint_circle(0, 1, 1.0, 2.0)
-    assert np.allclose(circle(2.0), 0.0)
-    assert not np.allclose(circle(1.0), 0.0)
-    servo = joint_servo(state, np.arange(6.0), path, stiffness=10.0, damping=0.0)
-    assert np.allclose(servo(state.q, state.v, 9.0).tau, np.arange(6.0) + 7.0 * np.eye(6)[2])
-
-
 def test_a_servo_turns_back_joints_without_limits():
     state = fb.load("kinova").standing()  # three of its joints are (cos, sin) in q
     turned = state.integrate(0.1 * np.eye(6)[0])

@@ -17,17 +17,6 @@ def go2() -> Robot:
     return fb.load("go2")
 
 
-def test_foot_displacement_is_that_of_the_worst_foot(go2):
-    state = go2.standing()
-    contacts = fb.Contacts.points(go2)
-    lifted = state.replace(q=state.integrate(0.03 * np.eye(18)[2]))
-    bent = state.replace(q=state.integrate(0.1 * np.eye(18)[8]))  # the first foot's knee
-    far = np.linalg.norm(contacts.positions(bent)[0] - contacts.positions(state)[0])
-    assert np.allclose(
-        lesson02.foot_displacement([state, lifted, bent], contacts), [0.0, 0.03, far]
-    )
-
-
 def test_a_run_with_constant_torques_records_the_forces_of_the_equations(go2):
     contacts = fb.Contacts.points(go2)
     record = lesson02.run_constant_torques(

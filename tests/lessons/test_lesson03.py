@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import dimensions
-from floatbase.lessons.lesson03 import beta_direction, rising_solo8_eom, upright_solo12
+from floatbase.lessons.lesson03 import beta_direction, rising_solo8_eom
 
 GO2 = fb.load("go2")
 # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
@@ -36,14 +35,3 @@ def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces
     np.testing.assert_allclose((space.qdd.A @ step)[:6], desired, atol=1e-9)
     free = np.linalg.svd(space.qdd.A[:6])[2][6:].T
     np.testing.assert_allclose((space.forces.A @ free).T @ (space.forces.A @ step), 0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize("bend", [0.0, 0.5, 1.5])
-def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend):
-    solo12 = fb.load("solo12")
-    state = upright_solo12(solo12, bend)
-    assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [
-        0.0
-    ] * 4
-    straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
-    assert straight.rank_J == (11 if bend == 0 else 12)

@@ -78,11 +78,9 @@ def test_the_arm_moves_the_centre_of_mass():
 
 def test_the_engine_measures_the_planned_forces():
     forces = inclined_design()(FORCE).minimiser()
-    record = fb.rollout(
-        fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1
-    )
-    np.testing.assert_allclose(
-        record.measured[-1], forces, atol=1.0
-    )  # N: the robot has moved by 2 cm
+    controller = ConstantForceController(GO2, EOM.contacts, forces)
+    record = fb.rollout(fb.Simulation(GO2, 0.5), controller, 0.1)
+    # N: the robot has moved by 2 cm
+    np.testing.assert_allclose(record.measured[-1], forces, atol=1.0)
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)

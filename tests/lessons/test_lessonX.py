@@ -117,9 +117,8 @@ def test_a_box_holds_nothing_but_the_record():
 def test_the_assumed_normal_is_wrong_only_if_it_is_the_fault():
     for case, box in cases(1):
         off = np.rad2deg(np.arccos(min(1.0, ground_normal(box) @ box.contacts.normals[0])))
-        assert off == pytest.approx(
-            case.injected_fault.size if case.injected_fault.kind == "normal" else 0.0, abs=0.2
-        )
+        fault = case.injected_fault
+        assert off == pytest.approx(fault.size if fault.kind == "normal" else 0.0, abs=0.2)
 
 
 def test_equation_7_holds_for_all_measurements():
@@ -151,10 +150,8 @@ def test_the_evidence_against_a_wrong_diagnosis_is_true(seed):
         assert (max(np.abs(plan[0]).max() for plan in plans) > 1.0) == (fault == "mass")
         assert lost > 0.99 if fault == "drift" else lost < 0.01
         got, told = forces[:, 6:], box.tau[:-1]
-        late = [
-            np.median(np.abs(lagged(told, 0.002, ms) - got), axis=0).max()
-            for ms in range(0, 120, 2)
-        ]
+        lags = [lagged(told, 0.002, ms) - got for ms in range(0, 120, 2)]
+        late = [np.median(np.abs(lag), axis=0).max() for lag in lags]
         if fault == "swapped motors":
             assert min(late) > 0.5
         elif fault != "slow motors":
@@ -167,13 +164,11 @@ def test_a_forgotten_drift_fells_the_robot():
 
 def test_a_wrong_mass_scales_the_planned_forces():
     state = judges.load("go2").standing()
-    tasks = fb.standing_tasks(state)
-    heavy = fb.WholeBodyController(
-        state.robot, fb.Contacts.points(state.robot), tasks, modify_qp=ModelMismatch(mass=1.2)
-    )
-    assert heavy(state.q, state.v).forces[2::3].sum() == pytest.approx(
-        1.2 * state.robot.weight, rel=1e-3
-    )
+    tasks, contacts = fb.standing_tasks(state), fb.Contacts.points(state.robot)
+    mismatch = ModelMismatch(mass=1.2)
+    heavy = fb.WholeBodyController(state.robot, contacts, tasks, modify_qp=mismatch)
+    planned = heavy(state.q, state.v).forces[2::3].sum()
+    assert planned == pytest.approx(1.2 * state.robot.weight, rel=1e-3)
     box = crash_test("mass", 1.2, seconds=0.01)
     assert box.planned[0, 2::3].sum() == pytest.approx(1.2 * box.robot.weight, rel=1e-3)
 
@@ -190,20 +185,17 @@ def test_the_required_torques_are_those_that_were_applied():
     """The physics' own, which no box holds."""
     robot = judges.load("go2")
     state = robot.standing()
-    controller = fb.WholeBodyController(
-        robot, fb.Contacts.points(robot, mu=1.2), fb.standing_tasks(state)
-    )
+    contacts = fb.Contacts.points(robot, mu=1.2)
+    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
     sim = fb.Simulation(robot, 1.2)
     sim.reset(state)
     record = fb.rollout(sim, controller, 0.3, [fb.Push(np.array([30.0, 0.0, 0.0]), 0.05)], 0.002)
     box = BlackBox(
         "test", robot, record.contacts, record.time, record.q, record.v, record.measured,
-        record.tau_desired, record.planned,
-        np.zeros_like(record.v),
+        record.tau_desired, record.planned, np.zeros_like(record.v),
     )  # fmt: skip
     found = required_forces(box)
     assert np.abs(found[:, 6:] - record.tau[:-1]).max() < 0.2
     pushed = (record.time[:-1] > 0.06) & (record.time[:-1] < 0.14)
-    assert (
-        np.abs(found[pushed, 0] - 30.0).max() < 1.0 and np.abs(found[~pushed][60:, 0]).max() < 1.0
-    )
+    assert np.abs(found[pushed, 0] - 30.0).max() < 1.0
+    assert np.abs(found[~pushed][60:, 0]).max() < 1.0

@@ -27,16 +27,10 @@ def test_the_engine_confirms_the_stored_maps(lesson):
     outcomes = []
     for factor in (PART, 1 / PART):
         controller = controller_factory(lesson)()
-        push = fb.Push(
-            factor * recovery.pushes[2] * recovery.unit_vectors[2],
-            start=0.2,
-            duration=recovery.duration,
-        )
-        outcomes.append(
-            fb.rollout(
-                fb.Simulation(controller.robot), controller, 1.8, [push], control_period=4e-3
-            ).outcome
-        )
+        force = factor * recovery.pushes[2] * recovery.unit_vectors[2]
+        push = fb.Push(force, 0.2, recovery.duration)
+        run = fb.rollout(fb.Simulation(controller.robot), controller, 1.8, [push], 4e-3)
+        outcomes.append(run.outcome)
     assert outcomes[0] == "completed" != outcomes[1]
 
 

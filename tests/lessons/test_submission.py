@@ -21,13 +21,7 @@ from floatbase.lessons import all_exercises, check, hand_in, predict, progress
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, write_solutions
 from floatbase.lessons.publish.__main__ import main
 
-
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """One who has just begun, in a folder of their own."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 def through_a_file(answer: Any) -> Any:
@@ -36,11 +30,7 @@ def through_a_file(answer: Any) -> Any:
 
 def same(a: Any, b: Any) -> bool:
     if isinstance(a, fb.Quadratic):
-        return (
-            isinstance(b, fb.Quadratic)
-            and bool(np.array_equal(a.H, b.H) and np.array_equal(a.g, b.g))
-            and a.c == b.c
-        )
+        a, b = (a.H, a.g, a.c), (b.H, b.g, b.c)
     if isinstance(a, tuple):
         return isinstance(b, tuple) and all(same(*pair) for pair in zip(a, b, strict=True))
     return bool(np.array_equal(a, b))
@@ -68,21 +58,16 @@ def test_grading_judges_the_answers_and_not_the_claims_of_a_file(learner, capsys
     predict("02.c", 12.5, unit="mm")
     path = hand_in("Ada Lovelace")
     assert path.name == "answers-Ada_Lovelace.json" and "1 of" in capsys.readouterr().out
-    marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
+    graded = grades.grade_file(path)
+    marks = {mark.exercise: mark for mark in graded.results}
     assert (marks["00.1"].result, marks["00.1"].tries) == ("right", 3)
-    assert (marks["03.1"].result, marks["01.1"].result, grades.grade_file(path).predicted) == (
-        "wrong",
-        "·",
-        1,
-    )
-
+    assert (marks["03.1"].result, marks["01.1"].result, graded.predicted) == ("wrong", "·", 1)
     claimed = json.loads(path.read_text())
     claimed["exercises"]["00.1"]["answer"] = 7.0
     claimed["exercises"]["01.1"] = {"tries": 1, "right": 1, "answer": [0.0, 0.0, 0.0]}
     path.write_text(json.dumps(claimed))
-    assert {
-        mark.result for mark in grades.grade_file(path).results if mark.exercise in ("00.1", "01.1")
-    } == {"wrong"}
+    marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
+    assert marks["00.1"].result == marks["01.1"].result == "wrong"
 
 
 def test_hand_in_asks_to_check_again_answers_that_were_not_kept(learner, capsys):
@@ -107,10 +92,8 @@ def test_grading_shows_code_and_never_runs_it(learner):
     path = hand_in("Ada")
     out = grades.code_to_read([grades.grade_file(path)])
     assert len(ran) == before > 0
-    assert "    def row_to_drop" in out and "--- Ada, C.3" in out
-    assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == [
-        "--- Ada, C.3"
-    ]
+    assert "    def row_to_drop" in out
+    assert [line for line in out.splitlines() if line[:4].strip()] == ["--- Ada, C.3"]
 
 
 HOSTILE = (
@@ -125,23 +108,17 @@ def test_grading_accepts_an_answer_of_any_form(learner, kept):
     entry = {"tries": 1, "right": 1, "answer": kept}
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
-    path.write_text(
-        json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}})
-    )
+    exercises = dict.fromkeys(all_exercises(), entry) | {"99.1": 5}
+    path.write_text(json.dumps(found | {"exercises": exercises}))
     handed_in = grades.grade_file(path)
     assert {mark.result for mark in handed_in.results} == {"wrong"}
     assert handed_in.name.isprintable()
 
 
 NO_FILE = (
-    "",
-    "null",
-    "[]",
-    "{",
-    '{"form": 5}',
-    "[" * 100_000,
+    "", "null", "[]", "{", '{"form": 5}', "[" * 100_000,
     '{"form": "answers to the floatbase course", "name": 5}',
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
@@ -191,9 +168,8 @@ def test_a_pipe_or_a_device_among_the_files_is_reported(learner, capsys):
     good = hand_in("Ada")
     found, unread = grades.grade_files([learner / "pipe.json", learner / "zero.json", good])
     assert [one.name for one in found] == ["Ada"] and unread == 2
-    assert {"pipe.json", "zero.json"} <= {
-        Path(line.split()[0]).name for line in capsys.readouterr().err.splitlines()
-    }
+    told = capsys.readouterr().err
+    assert "pipe.json" in told and "zero.json" in told
 
 
 def test_learners_with_similar_names_keep_their_own_files(learner):
@@ -265,9 +241,8 @@ def test_lessons_for_teachers_hold_the_solutions(learner):
     assert write_solutions(path.parent, [lesson]) == [f"{path.name}: new"]
     cells = read_notebook(path).cells
     solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
-    assert {
-        c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata
-    } == solutions
+    shown = {c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata}
+    assert shown == solutions
     explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
     assert len(cells) == len(read_notebook(lesson).cells) + explained
 
@@ -316,6 +291,7 @@ def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner):
         ["run", "nowhere.ipynb"],
         ["run", "text"],
         ["run", "."],
+        ["site", "no.ipynb", "--to", "site"],
         ["solutions", "--to", "text"],
         ["grade", "text", "--before", "0001-01-01T00:00"],
         ["grade", "text", "--before", "9999-12-31T23:59"],

@@ -24,6 +24,11 @@ def standing(sim: PerturbedSimulation, seconds: float = 0.6) -> fb.Rollout:
     return fb.rollout(sim, controller, seconds, control_period=2e-3)
 
 
+def carried(record: fb.Rollout, rows: int) -> float:
+    """Mean vertical force of all contacts over the last rows, N."""
+    return float(record.measured[-rows:, 2::3].sum(axis=1).mean())
+
+
 def in_the_air(sim: PerturbedSimulation, omega: float = 0.0) -> None:
     state = GO2.standing()
     q, v = np.array(state.q), np.zeros(GO2.nv)
@@ -36,9 +41,7 @@ def test_an_unperturbed_simulation_equals_the_plain_one():
     plain, perturbed = fb.Simulation(GO2, 0.7), PerturbedSimulation(GO2, 0.7)
     controller = judges.controller_of("go2")
     push = [fb.Push([30.0, 10.0, 0.0])]
-    a, b = (
-        fb.rollout(sim, controller, 0.3, push, control_period=2e-3) for sim in (plain, perturbed)
-    )
+    a, b = (fb.rollout(sim, controller, 0.3, push, 2e-3) for sim in (plain, perturbed))
     assert np.array_equal(a.q, b.q) and np.array_equal(a.measured, b.measured)
 
 
@@ -55,9 +58,7 @@ def test_the_ground_carries_the_actual_mass():
     sim = PerturbedSimulation(GO2, perturbation=Perturbation(mass=1.2))
     record = standing(sim)
     assert record.outcome == "completed"
-    assert record.measured[-50:].reshape(50, -1, 3)[:, :, 2].sum(axis=1).mean() == pytest.approx(
-        1.2 * GO2.weight, rel=0.02
-    )
+    assert carried(record, 50) == pytest.approx(1.2 * GO2.weight, rel=0.02)
     sim.perturbation = Perturbation()
     assert np.isclose(sim.model.body_mass.sum(), GO2.mass)
 
@@ -111,12 +112,8 @@ def test_adhesion_lets_the_ground_pull():
         controller = fb.WholeBodyController(
             GO2, fb.Contacts.feet(GO2), tasks, modify_qp=mismatch, joint_limits=None
         )
-        record = fb.rollout(
-            sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], control_period=2e-3
-        )
-        nets[adhesion_force] = float(
-            record.measured.reshape(len(record), -1, 3)[-20:, :, 2].sum(axis=1).mean()
-        )
+        record = fb.rollout(sim, controller, 0.2, [fb.Push([0.0, 0.0, up], 0.0, 0.2)], 2e-3)
+        nets[adhesion_force] = carried(record, 20)
         stuck = sim.contact_positions()[:, 2].max() < 5e-3
         assert stuck == bool(adhesion_force)
     assert nets[0.0] == 0.0
@@ -132,11 +129,10 @@ def test_adhesion_acts_from_the_first_touch():
     sim.reset(state.replace(q=q, v=v))
     record = fb.rollout(sim, judges.controller_of("go2"), 0.03)
     momentum = GO2.mass * np.array([record.state(i).com_velocity[2] for i in range(len(record))])
-    force = record.measured.reshape(len(record), -1, 3)[:, :, 2].sum(axis=1) - GO2.weight
+    force = record.measured[:, 2::3].sum(axis=1) - GO2.weight
     assert np.any(record.measured[0] == 0.0) and np.any(record.measured[-1] != 0.0)
-    assert (
-        np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight
-    )  # the adhesion of one foot is a whole weight
+    # the adhesion of one foot is a whole weight
+    assert np.abs(np.diff(momentum) / sim.timestep - force[:-1]).max() < 0.2 * GO2.weight
 
 
 def test_motors_of_the_base_lift_it():
@@ -155,13 +151,8 @@ def test_friction_can_change_during_a_run():
     sim = PerturbedSimulation(GO2, 0.8)
     assert standing(sim, seconds=0.2).outcome == "completed"
     sim.perturbation = Perturbation(friction=0.05)
-    record = fb.rollout(
-        sim,
-        judges.controller_of("go2"),
-        0.3,
-        [fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)],
-        control_period=2e-3,
-    )
+    push = fb.Push([60.0, 0.0, 0.0], 0.2, 0.1)
+    record = fb.rollout(sim, judges.controller_of("go2"), 0.3, [push], 2e-3)
     forces = record.measured.reshape(len(record), -1, 3)
     assert np.all(np.hypot(*forces[:, :, :2].transpose(2, 0, 1)) <= 0.05 * forces[:, :, 2] + 0.1)
 
