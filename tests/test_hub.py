@@ -99,8 +99,8 @@ class Hub(NamedTuple):
     def kernels(self, student: str) -> list[psutil.Process]:
         """The kernels of a student."""
         home = str(self.folder / student)
-        all_ = self.process.children(recursive=True)
-        kernels = [child for child in all_ if "ipykernel_launcher" in " ".join(child.cmdline())]
+        children = self.process.children(recursive=True)
+        kernels = [child for child in children if "ipykernel_launcher" in " ".join(child.cmdline())]
         return [kernel for kernel in kernels if kernel.environ().get("HOME") == home]
 
     def ports(self, student: str) -> list[int]:
