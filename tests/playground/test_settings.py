@@ -144,7 +144,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(
-    ("name", "first"), zip(REFUSED, cycle(["default", "it trots", "motors of the base"]))
+    ("name", "first"), [*zip(REFUSED, cycle(["default", "it trots", "motors of the base"]))]
 )
 def test_a_refused_change_leaves_everything_as_it_was(first, name):
     """After a refused change, a session continues as one without the request does."""
