@@ -76,7 +76,7 @@ class Costs:
         """Time the piece of work again, and fail if all tests were run and cost too much."""
         self._pieces.append(piece_of_work())
         if self._is_worker:
-            session.config.workeroutput["pieces"] = self._pieces  # type: ignore[attr-defined]
+            session.config.workeroutput["pieces"] = self._pieces
         elif runs_all(session.config) and self._expensive():
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 

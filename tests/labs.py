@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import socket
+import subprocess
+import sys
 import time
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +72,23 @@ SCENE = """() => {
 # m, of the robot's base
 HEIGHT = "() => viewer.scene_tree.find(['meshcat', 'robot', 'root_joint']).object.position.z"
 DRAWN = "() => window.viewer?.num_messages_received > 0"
+
+
+@contextmanager
+def server(command: list[str], home: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
+    """A program of Jupyter that serves from this home, and its log."""
+    own = dict.fromkeys(("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "HOME"), str(home))
+    log = home / "server.log"
+    with log.open("w") as sink:
+        started = subprocess.Popen(
+            [sys.executable, "-m", *command], env=os.environ | own, cwd=home,
+            stdout=sink, stderr=subprocess.STDOUT, start_new_session=True,
+        )  # fmt: skip
+    try:
+        yield started, log
+    finally:
+        os.killpg(started.pid, signal.SIGTERM)
+        started.wait(timeout=20)
 
 
 def only(page: Any, address: str) -> list[str]:
@@ -152,9 +173,8 @@ def _idle_sliders(
         _move(page, page.locator(f'[data-slider="{number}-{i}"]'))
         after = once_new(lambda: (frame.evaluate(SCENE), cell.evaluate(SAID)), before)
         idle += [slider] if after == before else []
-    end = once_new(
-        lambda: frame.evaluate(SCENE), start
-    )  # what the panel says may be there before the picture
+    # what the panel says may be there before the picture
+    end = once_new(lambda: frame.evaluate(SCENE), start)
     cell.locator("iframe").first.evaluate("(frame) => frame.scrollIntoView()")
     screenshot(page, f"{name.split('_')[0]}_panel_{number}")
     assert end != start, f"{name}, cell {number}: no slider moves the picture"
@@ -165,9 +185,7 @@ def _idle_sliders(
 def _changed(before: str, after: str) -> set[str]:
     """The parts of the picture that are not where they were."""
     lines = set(before.splitlines()) ^ set(after.splitlines())
-    return {
-        found.group(1) for line in lines if (found := re.match(r"[^ ]*/meshcat/([^/ ]+)", line))
-    }
+    return set(re.findall(r"^[^ ]*/meshcat/([^/ ]+)", "\n".join(lines), re.M))
 
 
 def picture_in(cell: Any) -> Any:

@@ -49,7 +49,7 @@ def annotations(value: Any) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("package", LISTED)
-def test_every_parameter_has_a_type_a_shape_and_a_unit(package: str) -> None:
+def test_every_parameter_has_a_type_a_shape_and_a_unit(package):
     wrong = []
     for name, value in public(package):
         found = validate(name)
@@ -69,7 +69,7 @@ def test_every_parameter_has_a_type_a_shape_and_a_unit(package: str) -> None:
 
 
 @pytest.mark.parametrize("package", LISTED)
-def test_examples_in_docstrings_run(package: str) -> None:
+def test_examples_in_docstrings_run(package):
     module = import_module(package)
     names = {"fb": import_module("floatbase"), "np": import_module("numpy"), **vars(module)}
     runner, finder = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS), doctest.DocTestFinder()

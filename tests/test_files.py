@@ -76,6 +76,10 @@ def test_two_files_of_one_folder_can_be_written_at_once(tmp_path):
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "a", "b": "b"}
 
 
+def no_space(*_: object) -> None:
+    raise OSError(28, "No space left on device")
+
+
 @pytest.mark.parametrize("extension", [".png", ".gif", ".mp4", ".html"])
 @pytest.mark.parametrize("linked", [False, True])
 def test_a_picture_that_fails_leaves_all_other_files(extension, linked, tmp_path, monkeypatch):
@@ -90,13 +94,10 @@ def test_a_picture_that_fails_leaves_all_other_files(extension, linked, tmp_path
 
     def pictures(*_: object) -> Iterator[Image.Image]:
         if broken and extension == ".png":
-            raise OSError(28, "No space left on device")
+            no_space()
         yield Image.new("RGB", (320, 200), "red")
         if broken:
-            raise OSError(28, "No space left on device")
-
-    def full_disk(*_: object) -> None:
-        raise OSError(28, "No space left on device")
+            no_space()
 
     monkeypatch.setattr(film, "_frames", pictures)
     broken = True
@@ -104,7 +105,7 @@ def test_a_picture_that_fails_leaves_all_other_files(extension, linked, tmp_path
         view.show(robot.standing())
         with monkeypatch.context() as patch, pytest.raises(ViewerError, match="No space"):
             if extension == ".html":
-                patch.setattr(Path, "write_bytes", full_disk)
+                patch.setattr(Path, "write_bytes", no_space)
             view.save(target, size=(320, 200))
         assert former.read_bytes() == b"former" and other.read_bytes() == b"other"
         broken = False
@@ -119,10 +120,7 @@ def test_a_table_that_cannot_be_written_leaves_the_former_one(tmp_path, monkeypa
     write_table([], table)
     former = table.read_bytes()
 
-    def full_disk(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    monkeypatch.setattr(Path, "write_bytes", no_space)
     with pytest.raises(InputError, match="No space"):
         write_table([], table)
     assert former and table.read_bytes() == former

@@ -99,29 +99,21 @@ class Hub(NamedTuple):
     def kernels(self, student: str) -> list[psutil.Process]:
         """The kernels of a student."""
         home = str(self.folder / student)
-        started = [
-            child
-            for child in self.process.children(recursive=True)
-            if "ipykernel_launcher" in " ".join(child.cmdline())
-        ]
-        return [kernel for kernel in started if kernel.environ().get("HOME") == home]
+        children = self.process.children(recursive=True)
+        kernels = [child for child in children if "ipykernel_launcher" in " ".join(child.cmdline())]
+        return [kernel for kernel in kernels if kernel.environ().get("HOME") == home]
 
     def ports(self, student: str) -> list[int]:
         """The ports that the processes of a student listen on, without those of kernels."""
         home = str(self.folder / student)
-        servers = [
-            child for child in self.process.children() if child.environ().get("HOME") == home
-        ]
+        servers = [one for one in self.process.children() if one.environ().get("HOME") == home]
         return [port for server in servers for port in listening(server)]
 
 
 def listening(process: psutil.Process) -> list[int]:
     """The ports that a process listens on."""
-    return [
-        found.laddr.port
-        for found in process.net_connections("inet")
-        if found.status == psutil.CONN_LISTEN
-    ]
+    found = process.net_connections("inet")
+    return [one.laddr.port for one in found if one.status == psutil.CONN_LISTEN]
 
 
 @pytest.fixture(scope="module")
@@ -190,9 +182,7 @@ def _log_in(page: Any, address: str, name: str) -> None:
     page.click("#login_submit", no_wait_after=True)
 
 
-def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(
-    class_: list[Student],
-) -> None:
+def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(class_):
     frames = [picture_in(push_panel_of(student.page)) for student in class_]
     first, second = (frame.evaluate(HEIGHT) for frame in frames)
     for student in class_:
@@ -203,19 +193,18 @@ def test_each_student_has_an_own_picture_that_falls_when_that_student_pushes(
     assert [student.strangers for student in class_] == [[], []]
 
 
-def test_no_port_of_a_students_kernel_tells_anything(hub: Hub, class_: list[Student]) -> None:
+def test_no_port_of_a_students_kernel_tells_anything(hub, class_):
     for student in class_:
         (kernel,) = hub.kernels(student.name)
         ports = listening(kernel)
-        assert (
-            len(ports) <= 1
-        )  # ipykernel's own, which only receives: what processes print that cells have started
+        # ipykernel's own, which only receives: what processes print that cells have started
+        assert len(ports) <= 1
         for port in ports:
             with pytest.raises((OSError, HTTPException)):
                 urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=2.0)
 
 
-def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student]) -> None:
+def test_a_student_gets_nothing_of_another_ones(hub, class_):
     ada, bob = class_
     kernels = f"{hub.address}/user/{bob.name}/api/kernels"
     own = bob.context.request.get(kernels)
@@ -227,12 +216,8 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
     page = ada.context.new_page()
     assert page.goto(f"{hub.address}/user/{bob.name}/lab").status == 403
     assert page.locator(".jp-Notebook").count() == 0
-    for address in (
-        kernels,
-        f"{kernels}/{kernel['id']}",
-        lesson,
-        f"{hub.address}/hub/api/users/{bob.name}",
-    ):
+    user = f"{hub.address}/hub/api/users/{bob.name}"
+    for address in (kernels, f"{kernels}/{kernel['id']}", lesson, user):
         assert ada.context.request.get(address).status in (403, 404), address
     page.close()
 
@@ -242,9 +227,8 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
     assert bob.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
     assert not ada.page.evaluate(OPENS, channels.format(bob.name, kernel["id"]))
 
-    assert (
-        hub.folder / bob.name / "floatbase"
-    ).stat().st_mode & 0o077 == 0  # no other account of the machine reads it
+    # no other account of the machine reads it
+    assert (hub.folder / bob.name / "floatbase").stat().st_mode & 0o077 == 0
 
     assert hub.ports(bob.name)
     for port in hub.ports(bob.name):  # past the hub, at the server itself
@@ -252,7 +236,7 @@ def test_a_student_gets_nothing_of_another_ones(hub: Hub, class_: list[Student])
         assert ada.context.request.get(address, max_redirects=0).status in (302, 403), address
 
 
-def test_lesson_03_moves_its_robot_arrows_and_veil(hub: Hub, class_: list[Student]) -> None:
+def test_lesson_03_moves_its_robot_arrows_and_veil(hub, class_):
     bob = class_[1]
     page = bob.context.new_page()
     page.set_default_timeout(1000 * LONG)

@@ -9,15 +9,12 @@ import sys
 from pathlib import Path
 from unittest.mock import MagicMock
 
-import pytest
 from waiting import until
 
 CONFIGURATION = Path(__file__).parent.parent / ".binder" / "jupyterhub_config.py"
 
 
-def test_a_python_in_a_folder_with_a_blank_starts_and_leaves_no_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_python_in_a_folder_with_a_blank_starts_and_leaves_no_folder(tmp_path, monkeypatch):
     python, log = tmp_path / "a folder" / "python", tmp_path / "log"
     python.parent.mkdir()
     python.write_text('#!/bin/sh\ntest -d "$JUPYTER_RUNTIME_DIR" && echo "$@" >>"$LOG"\n')

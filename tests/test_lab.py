@@ -12,14 +12,9 @@ both need no browser.
 from __future__ import annotations
 
 import json
-import os
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
@@ -38,18 +33,15 @@ from labs import (
     ran_without_error,
     run_all,
     screenshot,
+    server,
 )
 
 from floatbase.lessons.publish import MY_FOLDER, NOTEBOOKS, prepare_workspace, read_notebook
 
-LESSONS = (
-    "00_start_here",
-    "03_feasible_space",
-)  # a robot that is simulated under the page; panels of many sliders
-MOVES = {
-    LESSONS[0]: {"robot"},
-    LESSONS[1]: {"robot", "ghost", "planned"},
-}  # in their pictures; the ghost is the veil
+# a robot that is simulated under the page; panels of many sliders
+LESSONS = ("00_start_here", "03_feasible_space")
+# in their pictures; the ghost is the veil
+MOVES = {LESSONS[0]: {"robot"}, LESSONS[1]: {"robot", "ghost", "planned"}}
 
 pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 
@@ -90,42 +82,11 @@ def lab(course: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]
         place = home / "lab" / "user-settings" / f"{name}.jupyterlab-settings"
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(json.dumps(setting))
-    environment = {
-        **os.environ,
-        "JUPYTER_CONFIG_DIR": str(home),
-        "JUPYTER_DATA_DIR": str(home),
-        "HOME": str(home),
-    }
-    log = home / "server.log"
-    with log.open("w") as sink:
-        server = subprocess.Popen(
-            [
-                *(
-                    sys.executable,
-                    "-m",
-                    "jupyterlab",
-                    "--no-browser",
-                    "--ip=127.0.0.1",
-                    "--port=0",
-                    "--allow-root",
-                ),
-                *(
-                    "--IdentityProvider.token=a-test",
-                    "--LabApp.expose_app_in_browser=True",
-                    "--LabApp.news_url=None",
-                ),
-                str(course),
-            ],
-            env=environment,
-            stdout=sink,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-    try:
+    options = ["--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"]
+    options += ["--IdentityProvider.token=a-test", "--LabApp.expose_app_in_browser=True"]
+    options += ["--LabApp.news_url=None"]
+    with server(["jupyterlab", *options, str(course)], home) as (_, log):
         yield address_in(log)
-    finally:
-        os.killpg(server.pid, signal.SIGTERM)
-        server.wait(timeout=20)
 
 
 browser = browser_of_a_file
@@ -133,8 +94,8 @@ browser = browser_of_a_file
 
 @pytest.mark.parametrize("name", LESSONS)
 def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_counts_as_writing(
-    lab: str, course: Path, browser: Any, name: str
-) -> None:
+    lab, course, browser, name
+):
     page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, lab)

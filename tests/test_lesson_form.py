@@ -45,9 +45,8 @@ def asked(cell: Any) -> list[str]:
 def calls(cell: Any, function: str) -> list[ast.Call]:
     """The calls of that function in a cell of code."""
     nodes = ast.walk(ast.parse(cell.source)) if cell.cell_type == "code" else ()
-    return [
-        node for node in nodes if isinstance(node, ast.Call) and ast.unparse(node.func) == function
-    ]
+    found = [node for node in nodes if isinstance(node, ast.Call)]
+    return [call for call in found if ast.unparse(call.func) == function]
 
 
 def named(path: Path, function: str) -> list[tuple[int, str]]:
@@ -83,7 +82,7 @@ def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
 
 
 @LESSONS
-def test_predictions_are_named_in_order(path: Path) -> None:
+def test_predictions_are_named_in_order(path):
     lesson = path.stem.split("_")[0]
     names = [name for cell in cells(path) for name in asked(cell)]
     assert names, "a lesson without a question"
@@ -92,7 +91,7 @@ def test_predictions_are_named_in_order(path: Path) -> None:
 
 
 @LESSONS
-def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
+def test_every_question_is_followed_by_an_empty_prediction(path):
     wrong = []
     for before, cell in zip(cells(path), cells(path)[1:], strict=False):
         predicted = calls(cell, "predict")
@@ -100,11 +99,8 @@ def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
             wrong.append(f"{asked(before)}: no predict(…) right below")
         for call in predicted:
             name = ast.literal_eval(call.args[0])
-            rest = [
-                line
-                for line in ast.parse(cell.source).body
-                if not isinstance(line, ast.Import | ast.ImportFrom)
-            ]
+            body = ast.parse(cell.source).body
+            rest = [line for line in body if not isinstance(line, ast.Import | ast.ImportFrom)]
             fits = {
                 "the question right above": asked(before) == [name],
                 "a cell of its own": len(rest) == 1,
@@ -115,31 +111,23 @@ def test_every_question_is_followed_by_an_empty_prediction(path: Path) -> None:
             wrong += [f"{name}: it needs {what}" for what, fit in fits.items() if not fit]
     assert wrong == []
     for cell in cells(path):
-        assert (
-            bool(calls(cell, "predict"))
-            == tagged(cell, "predict")
-            == ("prediction" in cell.metadata)
-        ), cell.source
+        predicts = bool(calls(cell, "predict"))
+        assert predicts == tagged(cell, "predict") == ("prediction" in cell.metadata), cell.source
 
 
 @LESSONS
-def test_every_prediction_is_compared_once_with_a_computed_number(path: Path) -> None:
+def test_every_prediction_is_compared_once_with_a_computed_number(path):
     predicted = {name: i for i, name in named(path, "predict")}
     compared = {name: i for i, name in named(path, "compare")}
     assert len(compared) == len(named(path, "compare"))
     assert sorted(compared) == sorted(predicted)
     assert [name for name, i in compared.items() if i <= predicted[name]] == []
-    typed = [
-        call.args[0]
-        for cell in cells(path)
-        for call in calls(cell, "compare")
-        if is_typed(call.args[1])
-    ]
-    assert [ast.unparse(name) for name in typed] == []
+    comparing = [call for cell in cells(path) for call in calls(cell, "compare")]
+    assert [ast.unparse(call) for call in comparing if is_typed(call.args[1])] == []
 
 
 @LESSONS
-def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Path) -> None:
+def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path):
     wrong, predicting = [], ""
     for cell in cells(path):
         if cell.cell_type == "markdown":
@@ -152,13 +140,13 @@ def test_no_cell_between_a_prediction_and_its_reason_asserts_the_answer(path: Pa
 
 
 @LESSONS
-def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
+def test_assertions_are_in_folded_cells_without_output(path):
     wrong = []
     for cell in code(path):
         body = ast.parse(cell.source).body
         fits = {
             "asserts outside of its claims": not asserts(cell)
-            or any(tagged(cell, t) for t in ("claims", "exercise", "check")),
+            or any(tagged(cell, t) for t in ("claims", "exercise", "check"))
         }
         if tagged(cell, "claims"):
             fits |= {
@@ -174,7 +162,7 @@ def test_assertions_are_in_folded_cells_without_output(path: Path) -> None:
 
 
 @LESSONS
-def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> None:
+def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path):
     lesson = path.stem.split("_")[0]
     sources = [cell.source for cell in code(path)]
     sources += [e.solution for name, e in all_exercises().items() if name.startswith(f"{lesson}.")]
@@ -184,7 +172,7 @@ def test_code_fits_the_window_and_adds_no_zero_to_hide_a_minus(path: Path) -> No
 
 
 @LESSONS
-def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
+def test_a_lesson_ends_with_a_review_of_its_predictions(path):
     lesson = path.stem.split("_")[0]
     ((at, call),) = [
         (i, call) for i, cell in enumerate(cells(path)) for call in calls(cell, "review")
@@ -194,7 +182,7 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path: Path) -> None:
 
 
 @LESSONS
-def test_all_lessons_except_the_first_begin_with_recall(path: Path) -> None:
+def test_all_lessons_but_the_first_begin_with_recall(path):
     recalls = [i for i, cell in enumerate(code(path)) if cell.source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
 
@@ -205,23 +193,19 @@ def the_map() -> str:
 
 
 @LESSONS
-def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path: Path) -> None:
+def test_the_map_lists_the_equations_that_a_lesson_writes_with_their_numbers(path):
     for teaches, tags in taught(path):
         assert {equation for equation in teaches if not equation.startswith("App.")} == tags
         assert teaches <= set(equations.TITLES), "the map has no such equation"
     parts = re.split(r"^#+ (?=\(|App)", the_map(), flags=re.MULTILINE)
-    here = {
-        equation
-        for equation in equations.TITLES
-        for part in parts
-        if part.startswith(f"{equation} ") and path.name in part
-    }
+    of_lesson = [part for part in parts if path.name in part]
+    here = {e for e in equations.TITLES if any(part.startswith(f"{e} ") for part in of_lesson)}
     missing = {equation for teaches, _ in taught(path) for equation in teaches} - here
     assert missing == set(), "run `python -m floatbase.lessons.publish map`"
 
 
 @LESSONS
-def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path: Path) -> None:
+def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path):
     stated = re.search(r"\*\*Time\*\* (\d+) minutes", cells(path)[0].source)
     assert stated, "a lesson without a time"
     assert int(stated[1]) == lesson_minutes(path)

@@ -20,12 +20,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 from panels import moved_sliders
 
 from floatbase.lessons import all_exercises, check, progress
-from floatbase.lessons.publish import (
-    NOTEBOOKS,
-    read_notebook,
-    run_and_store,
-    with_solutions,
-)
+from floatbase.lessons.publish import NOTEBOOKS, read_notebook, run_and_store, with_solutions
 
 HOME = 'os.environ["FLOATBASE_HOME"]'
 LESSONS = sorted(NOTEBOOKS.glob("*.ipynb"))
@@ -90,9 +85,8 @@ def followed_by_its_learner(path: Path) -> Any:
         f"import os; assert os.listdir({HOME}) == []  # no exercise was tried, no prediction made",
         moved_sliders(notebook),
     ]
-    after += [
-        with_an_answer(cell.source) for cell in notebook.cells if "prediction" in cell.metadata
-    ]
+    predicting = [cell for cell in notebook.cells if "prediction" in cell.metadata]
+    after += [with_an_answer(cell.source) for cell in predicting]
     after += ["for __name, __value in __compared.items(): __compare(__name, __value)"]
     after += [cell.source for cell in answers if "exercise" in cell.metadata]
     after += [
@@ -100,10 +94,8 @@ def followed_by_its_learner(path: Path) -> Any:
         for cell in checks(answers)
     ]
     after += [HAND_IN]
-    cells = [
-        new_code_cell(source, metadata={"tags": ["nbval-ignore-output"]})
-        for source in [WATCH, *after]
-    ]
+    ignored = {"tags": ["nbval-ignore-output"]}
+    cells = [new_code_cell(source, metadata=ignored) for source in [WATCH, *after]]
     notebook.cells = [cells[0], *notebook.cells, *cells[1:]]
     return notebook
 
@@ -116,20 +108,15 @@ def with_an_answer(source: str) -> str:
     """A prediction's cell with some answer in place of its ...."""
     call = next(node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
     given = {part.arg: ast.literal_eval(part.value) for part in call.keywords}
-    answer = (
-        given["choices"][0]
-        if "choices" in given
-        else [1.0] * given["count"]
-        if "count" in given
-        else 1.0
-    )
+    numbers = [1.0] * given["count"] if "count" in given else 1.0
+    answer = given["choices"][0] if "choices" in given else numbers
     return source.replace("...", repr(answer), 1)
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
 def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
-    path: Path, lessons: LessonRunner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    path, lessons, tmp_path, monkeypatch
+):
     home = tmp_path / "home"
     home.mkdir()
     notebook = followed_by_its_learner(path)
@@ -144,9 +131,8 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
         cell.metadata["prediction"] for cell in notebook.cells if "prediction" in cell.metadata
     ]
     kept = progress.predictions()
-    assert sorted(kept) == sorted(names) and all(
-        {"said", "is"} <= set(entry) for entry in kept.values()
-    )
+    assert sorted(kept) == sorted(names)
+    assert all({"said", "is"} <= set(entry) for entry in kept.values())
     number = path.stem.split("_")[0]
     solved_now = {name for name, entry in progress.load().items() if entry["right"]}
     assert solved_now == {name for name in all_exercises() if name.startswith(f"{number}.")}
@@ -161,50 +147,40 @@ def lines_after_imports(source: str) -> int:
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path: Path) -> None:
+def test_a_stored_lesson_is_small_and_has_short_cells_without_pictures(path):
     assert path.stat().st_size < 1_000_000
     notebook = read_notebook(path)
     assert "widgets" not in notebook.metadata
     for cell in notebook.cells:
         if cell.cell_type == "code":
             assert lines_after_imports(cell.source) <= 15, cell.source
-            assert not any("text/html" in output.get("data", {}) for output in cell.outputs), (
-                cell.source
-            )
-            assert not any(output.output_type == "error" for output in cell.outputs)
+            for output in cell.outputs:
+                assert "text/html" not in output.get("data", {}), cell.source
+                assert output.output_type != "error"
 
 
 @pytest.mark.parametrize("path", LESSONS, ids=ids)
-def test_a_lesson_starts_from_the_stubs_of_its_exercises(path: Path) -> None:
+def test_a_lesson_starts_from_the_stubs_of_its_exercises(path):
     known = all_exercises()
-    cells = {
-        c.metadata["exercise"]: c.source
-        for c in read_notebook(path).cells
-        if "exercise" in c.metadata
-    }
+    cells = [cell for cell in read_notebook(path).cells if "exercise" in cell.metadata]
+    stubs = {cell.metadata["exercise"]: cell.source for cell in cells}
     number = path.stem.split("_")[0]
-    assert set(cells) == {name for name in known if name.startswith(f"{number}.")}
-    for name, source in cells.items():
-        assert source == known[name].stub
+    assert stubs == {n: e.stub for n, e in known.items() if n.startswith(f"{number}.")}
 
 
-def test_an_exercise_without_an_answer_gets_its_own_verdict() -> None:
-    verdicts = {name: check(name, None) for name in all_exercises()}
-    assert [
-        name
-        for name, verdict in verdicts.items()
-        if verdict.right or "no answer yet" not in verdict.text
-    ] == []
+def test_an_exercise_without_an_answer_gets_its_own_verdict():
+    for name in all_exercises():
+        verdict = check(name, None)
+        assert not verdict.right and "no answer yet" in verdict.text, name
 
 
-def test_run_and_store_keeps_the_output_and_does_not_count_as_a_try(tmp_path: Path) -> None:
+def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path):
     spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"
     lesson = tmp_path / "lesson.ipynb"
-    nbformat.write(
-        new_notebook(cells=[new_code_cell(source) for source in (spoken, tried, shown)]), lesson
-    )
+    cells = [new_code_cell(source) for source in (spoken, tried, shown)]
+    nbformat.write(new_notebook(cells=cells), lesson)
     check("00.1", 2.0)
     before = progress.load()
     run_and_store(lesson)
@@ -215,5 +191,5 @@ def test_run_and_store_keeps_the_output_and_does_not_count_as_a_try(tmp_path: Pa
     assert progress.load() == before
 
 
-def test_tests_do_not_touch_the_progress_of_their_user() -> None:
+def test_tests_do_not_touch_the_progress_of_their_user():
     assert Path.home() not in progress.path().parents

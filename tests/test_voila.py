@@ -6,13 +6,8 @@ and does without them.
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import Any
 
 import nbformat
 import pytest
@@ -28,6 +23,7 @@ from labs import (
     push_panel_of,
     push_until_it_falls,
     screenshot,
+    server,
 )
 from waiting import until
 
@@ -53,45 +49,18 @@ def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     lesson = read_notebook(NOTEBOOKS / "00_start_here.ipynb")
     lesson.cells.append(nbformat.v4.new_code_cell(PLAYGROUND))
     nbformat.write(lesson, home / "lesson.ipynb")
-    environment = {
-        **os.environ,
-        "JUPYTER_CONFIG_DIR": str(home),
-        "JUPYTER_DATA_DIR": str(home),
-        "HOME": str(home),
-    }
     (port,) = free_ports(1)
-    command = [
-        sys.executable,
-        "-m",
-        "voila",
-        "lesson.ipynb",
-        "--no-browser",
-        f"--port={port}",
-        "--Voila.ip=127.0.0.1",
-    ]
-    log = home / "voila.log"
-    with log.open("w") as sink:
-        server = subprocess.Popen(
-            command,
-            env=environment,
-            cwd=home,
-            stdout=sink,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-    try:
-        until(lambda: answers(port) or server.poll() is not None)
-        assert server.poll() is None, log.read_text()
+    options = ["--no-browser", f"--port={port}", "--Voila.ip=127.0.0.1"]
+    with server(["voila", "lesson.ipynb", *options], home) as (started, log):
+        until(lambda: answers(port) or started.poll() is not None)
+        assert started.poll() is None, log.read_text()
         yield f"http://127.0.0.1:{port}"
-    finally:
-        os.killpg(server.pid, signal.SIGTERM)
-        server.wait(timeout=20)
 
 
 browser = browser_of_a_file
 
 
-def test_the_pictures_of_a_page_without_code_move(voila: str, browser: Any) -> None:
+def test_the_pictures_of_a_page_without_code_move(voila, browser):
     page = browser.new_page(**WINDOW)
     page.set_default_timeout(1000 * LONG)
     strangers = only(page, voila)

@@ -1,4 +1,4 @@
-"""A class of sixty: packages without solutions, own numbers, late days, and gradebooks."""
+"""A class: packages without solutions, own numbers, late days, and gradebooks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,9 @@ import numpy as np
 import pytest
 from hints import MASS
 
+from floatbase import lessons
 from floatbase.errors import InputError
-from floatbase.lessons import all_exercises, check, hand_in, own_numbers, progress, reveal
+from floatbase.lessons import all_exercises, check, hand_in, own_numbers, progress
 from floatbase.lessons.publish import gradebook, grades, package
 from floatbase.lessons.publish.__main__ import main
 
@@ -28,12 +28,7 @@ DUE = datetime(2026, 5, 1, 18, tzinfo=UTC)
 LESSONS = ("00", "01", "06")  # of the assignment
 
 
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """One who has just begun, in a folder of their own."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 # the package of an assignment ---------------------------------------------------------------------
@@ -63,7 +58,7 @@ def squeezed(line: str) -> str:
     return re.sub(r"\s+", "", line)
 
 
-def test_an_assignment_holds_no_solution(assigned: Path) -> None:
+def test_an_assignment_holds_no_solution(assigned):
     files = [path for path in assigned.rglob("*") if path.is_file()]
     found = {path: texts_of(path) for path in files}
     secret = {(n, t) for n, e in EXERCISES.items() for t in (e.solution, e.explanation) if t}
@@ -78,19 +73,15 @@ def test_an_assignment_holds_no_solution(assigned: Path) -> None:
             if is_code and len(line) > 25:
                 assert [p for p, text in programs.items() if line in text] == [], (n, line)
     # the search finds them where they are
-    ours = texts_of(
-        Path(sys.modules["floatbase"].__file__).parent / "lessons/lesson05/exercises.py"
-    )
+    ours = texts_of(Path(lessons.__file__).parent / "lesson05/exercises.py")
     assert all(e.solution in ours for n, e in EXERCISES.items() if n.startswith("05."))
     names = {path.name for path in (assigned / "notebooks").glob("*.ipynb")}
     assert {name.split("_")[0] for name in names} == {"00", "01", "05"}
-    readme = (assigned / "README.md").read_text()
-    assert "05 · Steering" in readme and "docs/quickstart" not in readme
     assert (assigned / ".binder/jupyterhub_config.py").is_file()
     assert not any("solved" in path.name or "tests" in path.parts for path in files)
 
 
-def test_an_assignment_checks_answers_and_names_the_teacher(assigned: Path, learner: Path) -> None:
+def test_an_assignment_checks_answers_and_names_the_teacher(assigned, learner):
     program = (
         "import sys; sys.dont_write_bytecode = True\n"
         "from floatbase.lessons import all_exercises, check, reveal\n"
@@ -115,9 +106,7 @@ def test_an_assignment_checks_answers_and_names_the_teacher(assigned: Path, lear
     assert int(known) == len(EXERCISES)
 
 
-def test_an_assignment_needs_known_lessons_and_a_new_folder(
-    assigned: Path, learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_assignment_needs_known_lessons_and_a_new_folder(assigned, learner, capsys):
     with pytest.raises(InputError, match="99"):
         package.write_assignment(learner / "new", ["99"])
     assert not (learner / "new").exists()
@@ -127,20 +116,13 @@ def test_an_assignment_needs_known_lessons_and_a_new_folder(
         main(["assign", "99", "--to", "new", "--without-solutions"])
 
 
-def test_reveal_prints_a_solution_of_the_whole_course(capsys: pytest.CaptureFixture[str]) -> None:
-    for answer in (3.0, 4.0):
-        check("00.1", answer)
-    reveal("00.1")
-    assert EXERCISES["00.1"].solution in capsys.readouterr().out
-
-
 # own numbers --------------------------------------------------------------------------------------
 
 OWN = [name for name, exercise in EXERCISES.items() if exercise.own]
 
 
 @pytest.mark.parametrize("name", OWN)
-def test_personal_numbers_have_their_own_right_answers(name: str) -> None:
+def test_personal_numbers_have_their_own_right_answers(name):
     exercise = EXERCISES[name]
     assert exercise.own is not None and len(set(exercise.own.values)) > 4
     standard = [answer for answer, hint in exercise.examples() if not hint]
@@ -153,11 +135,8 @@ def test_personal_numbers_have_their_own_right_answers(name: str) -> None:
         assert str(value) in exercise.own.text.format(value)
 
 
-def test_a_student_always_gets_the_same_numbers(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_student_always_gets_the_same_numbers(capsys):
     own = EXERCISES["00.1"].own
-    assert own is not None
     values = {student: own.value("00.1", student) for student in map(str, range(60))}
     assert set(values.values()) == set(own.values)
     assert own.value("00.1", "7") == values["7"]
@@ -169,14 +148,13 @@ def test_a_student_always_gets_the_same_numbers(
     assert check("00.1", MASS * (9.81 + values["7"])).right
     for wrong in ("", "a\nb", "a" * 81, 5):
         with pytest.raises(InputError, match="id"):
-            own_numbers(wrong)  # type: ignore[arg-type]
+            own_numbers(wrong)
     assert progress.student() == "7"
 
 
-def test_grading_uses_the_numbers_of_the_id(learner: Path) -> None:
+def test_grading_uses_the_numbers_of_the_id(learner):
     own_numbers("s7")
     own = EXERCISES["00.1"].own
-    assert own is not None
     check("00.1", MASS * (9.81 + own.value("00.1", "s7")))
     path = hand_in("Ada", lesson="0")
     assert path.name == "answers-Ada-lesson00.json"
@@ -188,7 +166,7 @@ def test_grading_uses_the_numbers_of_the_id(learner: Path) -> None:
         hand_in("Ada", lesson="5")
 
 
-# sixty hand-ins -----------------------------------------------------------------------------------
+# hand-ins of a class ------------------------------------------------------------------------------
 
 
 def right_answer(name: str, student: str) -> Any:
@@ -201,12 +179,12 @@ def right_answer(name: str, student: str) -> Any:
 KINDS = ("right", "partial", "late", "forged", "malformed", "few")
 
 
-def class_of_sixty(folder: Path) -> dict[str, tuple[str, float | None]]:
-    """Write sixty files; return for each id what it is and the points that it deserves."""
+def class_of_24(folder: Path) -> dict[str, tuple[str, float | None]]:
+    """Write 24 files; return for each id what it is and the points that it deserves."""
     names = [n for n in EXERCISES if n.split(".")[0] in LESSONS and n != "06.3"]
     answers = {name: progress.as_json(right_answer(name, "")) for name in names if name not in OWN}
     expected: dict[str, tuple[str, float | None]] = {}
-    for i in range(60):
+    for i in range(24):
         student, kind = f"s{i:02}", KINDS[i % 6]
         given = dict(answers)
         for name in set(OWN) & set(names):
@@ -216,20 +194,18 @@ def class_of_sixty(folder: Path) -> dict[str, tuple[str, float | None]]:
             given = {name: answer for name, answer in given.items() if name < "01"}
         if kind == "few":
             given["01.3"] = 0.123
-        late = (
-            timedelta(days=1.5 if i % 12 == 2 else 4.0) if kind == "late" else -timedelta(hours=i)
-        )
+        late = timedelta(days=1.5 if i % 12 == 2 else 4.0)
         found = {
             "form": "answers to the floatbase course", "name": f"Student {i}", "id": student,
-            "time": (DUE + late).isoformat(), "predictions": {"00.a": {"said": "more"}},
+            "time": (DUE + late if kind == "late" else DUE).isoformat(),
+            "predictions": {"00.a": {"said": "more"}},
             "exercises": {n: {"tries": 1, "right": 1, "answer": a} for n, a in given.items()},
         }  # fmt: skip
         text = json.dumps(found)
         (folder / f"{student}.json").write_text(text[:-40] if kind == "malformed" else text)
-        own = EXERCISES["00.1"].own, EXERCISES["06.2"].own
         copied = sum(
-            o is not None and o.value(n, student) == o.value(n, f"s{i - 3:02}")
-            for n, o in zip(("00.1", "06.2"), own, strict=True)
+            EXERCISES[n].own.value(n, student) == EXERCISES[n].own.value(n, f"s{i - 3:02}")
+            for n in ("00.1", "06.2")
         )
         points: dict[str, float | None] = {
             "right": len(names), "partial": 1, "few": len(names) - 1, "malformed": None,
@@ -243,66 +219,53 @@ CANVAS = "Student,ID,SIS User ID,SIS Login ID,Section,Week 1 (4711)\n    Points 
 MOODLE = "First name,Surname,ID number,Institution,Email address\n"
 
 
-def test_a_class_of_sixty_becomes_a_column_in_canvas_and_in_moodle(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    expected = class_of_sixty(learner)
+def test_a_class_becomes_a_column_in_canvas_and_in_moodle(learner, capsys):
+    expected = class_of_24(learner)
     files = sorted(str(path) for path in learner.glob("s*.json"))
     (learner / "canvas.csv").write_text(
-        CANVAS + "".join(f'"{i}, Student",{9000 + i},s{i:02},login{i},A,\n' for i in range(60)),
+        CANVAS + "".join(f'"{i}, Student",{9000 + i},s{i:02},login{i},A,\n' for i in range(24)),
         encoding="utf-8-sig",
     )
     (learner / "moodle.csv").write_text(
-        MOODLE + "".join(f"Student,{i},s{i:02},U,s{i:02}@uni.edu\n" for i in range(60))
+        MOODLE + "".join(f"Student,{i},s{i:02},U,s{i:02}@uni.edu\n" for i in range(24))
     )
     options = ["--own-numbers", "--lessons", *LESSONS, "--due", DUE.isoformat(), "--late-days", "2"]
     for kind in ("canvas", "moodle"):
         table = learner / f"{kind}-points.csv"
-        started = time.perf_counter()
         with pytest.raises(SystemExit) as ended:
             main(["grade", *files, *options, "--gradebook", kind, "--roster", f"{kind}.csv",
                   "--column", "Week 1", "--table", str(table)])  # fmt: skip
-        assert time.perf_counter() - started < 60
-        assert ended.value.code == 1  # ten files could not be read
+        assert ended.value.code == 1  # four files could not be read
         printed = capsys.readouterr()
-        assert printed.err.count("was not written by hand_in") == 10
-        assert printed.out.count("too late") == 5 and printed.out.count("late days used: 2") == 5
+        assert printed.err.count("was not written by hand_in") == 4
+        assert printed.out.count("too late") == 2 and printed.out.count("late days used: 2") == 2
         rows = list(csv.DictReader(table.open(encoding="utf-8")))
         if kind == "canvas":
             assert list(rows[0]) == CANVAS.splitlines()[0].split(",")
             assert rows.pop(0)["Week 1 (4711)"] == str(sum(n[:2] in LESSONS for n in EXERCISES))
-        column, key = (
-            ("Week 1 (4711)", "SIS User ID") if kind == "canvas" else ("Week 1", "ID number")
-        )
-        points = {row[key]: row[column] for row in rows}
-        wanted = {s: str(p) for s, (_, p) in expected.items() if p is not None}
-        assert points == wanted
+            points = {row["SIS User ID"]: row["Week 1 (4711)"] for row in rows}
+        else:
+            points = {row["ID number"]: row["Week 1"] for row in rows}
+        assert points == {s: str(p) for s, (_, p) in expected.items() if p is not None}
     forged = [p for kind, p in expected.values() if kind == "forged"]
     full = max(p for _, p in expected.values() if p is not None)
     assert np.mean([p for p in forged if p is not None]) < full - 1
 
 
-def test_a_gradebook_matches_files_without_an_id_by_name(learner: Path) -> None:
+def test_a_gradebook_matches_files_without_an_id_by_name(learner):
     (learner / "roster.csv").write_text(
         'Student,ID,SIS User ID,Section\n"Curie, Marie",1,m1,A\n"Noether, Emmy",2,e2,A\n'
     )
     check("00.1", 3.0)
     files = [hand_in("marie  CURIE"), hand_in("Emmy Noether", id="e9")]
     table = learner / "points.csv"
-    messages = gradebook.write_gradebook(
-        "canvas",
-        [grades.grade_file(path) for path in files],
-        learner / "roster.csv",
-        table,
-        column="=Week",
-        policy=gradebook.Policy(("00",)),
-    )
+    graded, policy = [grades.grade_file(path) for path in files], gradebook.Policy(("00",))
+    args = ("canvas", graded, learner / "roster.csv", table)
+    messages = gradebook.write_gradebook(*args, column="=Week", policy=policy)
     assert len(messages) == 1 and "e9 matches nobody" in messages[0]
     assert [row[-1] for row in csv.reader(table.open())] == ["=Week", "0"]
     with pytest.raises(InputError, match="ID number"):
-        gradebook.write_gradebook(
-            "moodle", [], table, table, column="Week", policy=gradebook.Policy()
-        )
+        gradebook.write_gradebook("moodle", [], table, table, column="Week", policy=policy)
 
 
 @pytest.mark.parametrize(
@@ -314,7 +277,7 @@ def test_a_gradebook_matches_files_without_an_id_by_name(learner: Path) -> None:
          "Marie\tCurie\tm1\t-\nEmmy\tNoether\te2\t4\n"),
     ],
 )  # fmt: skip
-def test_a_gradebook_reads_other_forms_of_rosters(learner: Path, kind: str, roster: str) -> None:
+def test_a_gradebook_reads_other_forms_of_rosters(learner, kind, roster):
     """Importers delete a grade whose cell is empty, so a student without a file has no row."""
     (learner / "roster.csv").write_text(roster)
     check("00.1", MASS * 11.81)
@@ -325,9 +288,7 @@ def test_a_gradebook_reads_other_forms_of_rosters(learner: Path, kind: str, rost
         args = (kind, graded, learner / "roster.csv", table)
         assert gradebook.write_gradebook(*args, column="Week", policy=policy) == []
         header, *rows = [*csv.reader(table.open())]
-        assert header == [
-            name.strip() for name in roster.splitlines()[0].replace("\t", ";").split(";")
-        ]
+        assert header == [name.strip() for name in re.split("[;\t]", roster.splitlines()[0])]
         assert [(row[0].strip(), row[-1]) for row in rows if row[-1] != "1"] == []
         assert len(rows) == (2 if kind == "canvas" else 1)
 
@@ -336,15 +297,11 @@ def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:
     metadata = learner / "submission_metadata.json"
     target = learner / "results.json"
     gradebook.write_gradescope_results(files, target, metadata=metadata, **options)
-    found = json.loads(target.read_text())
-    assert isinstance(found, dict)
-    return found
+    return dict(json.loads(target.read_text()))
 
 
-def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(
-    learner: Path,
-) -> None:
-    class_of_sixty(learner)
+def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(learner):
+    class_of_24(learner)
     meta = {
         "created_at": (DUE + timedelta(days=1.5)).isoformat(),
         "assignment": {"due_date": DUE.isoformat(), "title": "Week 1"},
@@ -369,22 +326,9 @@ def test_gradescope_gets_a_score_for_each_exercise_and_hides_copied_files(
     assert results(learner, [learner / "s00.json"])["score"] > 0
 
 
-def test_an_autograder_consists_of_a_package_and_two_programs(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    main(
-        [
-            "grade",
-            "--gradescope",
-            "auto",
-            "--lessons",
-            "0",
-            "1",
-            "--late-days",
-            "3",
-            "--own-numbers",
-        ]
-    )
+def test_an_autograder_consists_of_a_package_and_two_programs(learner, capsys):
+    options = ["--lessons", "0", "1", "--late-days", "3", "--own-numbers"]
+    main(["grade", "--gradescope", "auto", *options])
     folder = learner / "auto"
     for name in ("setup.sh", "run_autograder"):
         assert os.access(folder / name, os.X_OK)

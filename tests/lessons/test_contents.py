@@ -19,9 +19,7 @@ def entries() -> list[equations.Entry]:
     return equations.entries()
 
 
-def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(
-    entries: list[equations.Entry],
-) -> None:
+def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(entries):
     paths = [entry.path for entry in entries]
     assert len(set(paths)) == len(paths)
     for path in paths:
@@ -31,13 +29,13 @@ def test_every_function_stands_in_the_map_once_by_the_path_that_users_import(
     assert {"dynamics.forces_from_torques", "affine.Quadratic.pullback"} <= set(paths)
 
 
-def test_a_test_counts_only_where_it_names_the_function(entries: list[equations.Entry]) -> None:
+def test_a_test_counts_only_where_it_names_the_function(entries):
     (entry,) = (entry for entry in entries if entry.path == "dynamics.forces_from_torques")
     assert any(test.startswith("dynamics/test_subspace.py") for test in entry.tests)
     assert not any(test.startswith("qp/") for test in entry.tests)
 
 
-def test_the_page_of_conventions_has_a_value_and_a_reason_for_every_tolerance() -> None:
+def test_the_page_of_conventions_has_a_value_and_a_reason_for_every_tolerance():
     shown = {(file, name): value for file, name, value, _ in conventions.tolerances()}
     assert float(shown["linear_algebra", "RANK_TOLERANCE"]) == RANK_TOLERANCE
     assert float(shown["dynamics/constraint_rank", "CONSTRAINT_NOISE"]) == CONSTRAINT_NOISE

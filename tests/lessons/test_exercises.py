@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import multiprocessing
 import re
-import resource
 import threading
 from collections import Counter
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from disk import full_disk
 from hints import LIFTED
 
 import floatbase as fb
@@ -21,10 +21,7 @@ from floatbase.lessons import all_exercises, check, progress, reveal, show_progr
 TIMES = 300  # tries of each of those who record at once
 
 
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """One who has just begun."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 def changed(answer: Any) -> Any:
@@ -40,7 +37,7 @@ def changed(answer: Any) -> Any:
     return answer + 1
 
 
-def test_a_placeholder_gets_its_hint_and_counts_no_try() -> None:
+def test_a_placeholder_gets_its_hint_and_counts_no_try():
     for name, exercise in all_exercises().items():
         placeholder = exercise.placeholder()
         said = check(name, placeholder)
@@ -50,16 +47,14 @@ def test_a_placeholder_gets_its_hint_and_counts_no_try() -> None:
     assert progress.load() == {}
 
 
-def test_an_answer_beside_the_placeholder_is_a_try() -> None:
+def test_an_answer_beside_the_placeholder_is_a_try():
     for name, exercise in all_exercises().items():
         said = check(name, changed(exercise.placeholder()))
         assert not said.right and said.is_try
     assert progress.load() == {name: {"tries": 1, "right": 0} for name in all_exercises()}
 
 
-def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(capsys):
     solution = all_exercises()["02.1"].solution
     for _ in range(3):
         check("02.1", (3, 8))
@@ -78,7 +73,7 @@ def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(
     assert solution in capsys.readouterr().out
 
 
-def test_progress_is_kept_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_is_kept_and_shown(capsys):
     check("00.1", None)
     assert progress.load() == {}
     marks = []
@@ -91,8 +86,8 @@ def test_progress_is_kept_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])
 def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+    tmp_path, monkeypatch, home, capsys
+):
     show_progress()
     assert "cannot be saved" not in capsys.readouterr().out
     (tmp_path / "file").write_text("")
@@ -106,7 +101,7 @@ def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
     assert re.search(said, capsys.readouterr().out)
 
 
-def test_without_any_home_a_check_still_works(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_any_home_a_check_still_works(monkeypatch):
     def none() -> Path:
         raise RuntimeError("Could not determine home directory.")
 
@@ -126,9 +121,7 @@ DAMAGED = (
 
 
 @pytest.mark.parametrize("text", DAMAGED)
-def test_damage_is_left_out_and_left_as_it_is(
-    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_damage_is_left_out_and_left_as_it_is(tmp_path, text, capsys):
     (tmp_path / "progress.jsonl").write_text(text)
     check("00.1", 3.0)
     check("00.1", LIFTED)
@@ -139,16 +132,12 @@ def test_damage_is_left_out_and_left_as_it_is(
     assert (tmp_path / "progress.jsonl").read_text().startswith(text)
 
 
-def test_a_full_disk_costs_one_try(tmp_path: Path) -> None:
+def test_a_full_disk_costs_one_try(tmp_path):
     progress.record_try("00.1", True)
     stored = tmp_path / "progress.jsonl"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (stored.stat().st_size + 12, before[1]))
-    try:
-        progress.record_try("00.1", True)  # a part of the line fits
+    with full_disk(stored.stat().st_size + 12):  # a part of the line fits
         progress.record_try("00.1", True)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        progress.record_try("00.1", True)
     progress.record_try("00.1", False)
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
 
@@ -159,9 +148,7 @@ def record_often(name: str) -> None:
 
 
 @pytest.mark.parametrize("worker", [threading.Thread, multiprocessing.get_context("fork").Process])
-def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(
-    tmp_path: Path, worker: Any
-) -> None:
+def test_many_at_once_lose_nothing_of_each_other_and_of_what_was_there(tmp_path, worker):
     older = {f"old.{i}": {"tries": 2, "right": 1} for i in range(50)}
     (tmp_path / "progress.jsonl").write_text(json.dumps(older))
     names = ["00.1", "00.1", "01.1"]

@@ -26,16 +26,10 @@ from floatbase.lessons.publish import grades
 from floatbase.lessons.publish.__main__ import main
 from floatbase.lessons.questions import all_questions
 
-
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """One who has just begun, in a folder of their own."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
-def test_nine_concepts_have_three_questions_with_four_different_answers_each() -> None:
+def test_nine_concepts_have_three_questions_with_four_different_answers_each():
     assert len(CONCEPTS) == 9 and {len(some) for some in CONCEPTS.values()} == {3}
     assert len({question.text for question in QUESTIONS}) == 27
     for question in QUESTIONS:
@@ -45,7 +39,7 @@ def test_nine_concepts_have_three_questions_with_four_different_answers_each() -
     assert all(4 <= KEY.count(letter) <= 9 for letter in LETTERS)
 
 
-def test_distractors_are_mistakes_that_the_course_knows() -> None:
+def test_distractors_are_mistakes_that_the_course_knows():
     lessons = Path(floatbase.__file__).parent / "lessons"
     named = [mistake for q in QUESTIONS for mistake in q.mistakes.values()]
     assert sum(bool(q.mistakes) for q in QUESTIONS) >= 20 and len(named) >= 36
@@ -66,7 +60,7 @@ def right_answer(words: str) -> str:
     return found.answers[found.right]
 
 
-def test_right_numbers_follow_from_plain_formulas() -> None:
+def test_right_numbers_follow_from_plain_formulas():
     g = 9.8
     assert right_answer("16 kg accelerates upwards") == f"{16 * (g + 2):.0f} N"
     assert right_answer("80 N in total") == f"{np.cross([0, 0.15, 0], [0, 0, 80])[0]:.0f} N·m"
@@ -87,7 +81,7 @@ def test_right_numbers_follow_from_plain_formulas() -> None:
 
 
 @pytest.mark.parametrize("name", ["go2", "solo12", "hyq"])
-def test_right_answers_about_a_quadruped_are_those_of_pinocchio(name: str) -> None:
+def test_right_answers_about_a_quadruped_are_those_of_pinocchio(name):
     robot = floatbase.load(name)
     state = robot.standing()
     contacts = floatbase.Contacts.points(robot)
@@ -119,9 +113,7 @@ def test_right_answers_about_a_quadruped_are_those_of_pinocchio(name: str) -> No
     assert np.allclose(drifts[1], int(right_answer("leaves out the drift")) * drifts[0])
 
 
-def test_two_students_gain_what_they_learned(
-    learner: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_students_gain_what_they_learned(learner, monkeypatch, capsys):
     """A guesser learns two concepts; another one knows half and loses nothing."""
     wrong = "".join("b" if right == "a" else "a" for right in KEY)
     files = []
@@ -149,9 +141,7 @@ def test_two_students_gain_what_they_learned(
     assert grades.grade_file(files[0]).inventory["before"] == wrong
 
 
-def test_questions_are_printed_without_the_key_and_odd_answers_are_refused(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_questions_are_printed_without_the_key_and_odd_answers_are_refused(capsys):
     inventory()
     shown = capsys.readouterr().out
     assert shown.count("   a) ") == 27 and KEY not in shown

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
-from typing import Any
 
 import pytest
 from browsers import browser_of_a_file
@@ -19,7 +17,7 @@ browser = browser_of_a_file
 QUESTIONS = lecture.lecture_questions()
 
 
-def test_each_lesson_has_four_questions_with_a_result_and_a_reason() -> None:
+def test_each_lesson_has_four_questions_with_a_result_and_a_reason():
     assert set(QUESTIONS) == {question.lesson for question in all_questions().values()}
     for asked in QUESTIONS.values():
         assert len({one.question.name for one in asked}) == 4
@@ -32,7 +30,7 @@ def test_each_lesson_has_four_questions_with_a_result_and_a_reason() -> None:
                 assert len(re.findall(r"\d+(?:\.\d+)?", result)) == question.count
 
 
-def test_reasons_come_from_the_lesson_or_from_the_metadata_of_the_question() -> None:
+def test_reasons_come_from_the_lesson_or_from_the_metadata_of_the_question():
     reasons = {one.question.name: one.reason for some in QUESTIONS.values() for one in some}
     assert [name for name, reason in reasons.items() if reason[-1] in ":?"] == []
     assert reasons["P.h"].startswith("At rest every foot pushes")
@@ -46,13 +44,13 @@ def text_of(lesson: str) -> str:
     return "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
 
 
-def test_a_result_that_is_not_stored_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_result_that_is_not_stored_is_named(monkeypatch):
     monkeypatch.setattr(lecture, "results", lambda cells: {})
     with pytest.raises(InputError, match=r"00\.a"):
         lecture.lecture_questions.__wrapped__()
 
 
-def test_page_and_slides_hold_all_questions(tmp_path: Path) -> None:
+def test_page_and_slides_hold_all_questions(tmp_path):
     page = lecture.page()
     main(["lecture", "--to", str(tmp_path / "slides.html")])
     slides = (tmp_path / "slides.html").read_text(encoding="utf-8")
@@ -67,7 +65,7 @@ def test_page_and_slides_hold_all_questions(tmp_path: Path) -> None:
 
 
 @pytest.mark.front_end
-def test_keys_turn_the_pages_and_show_the_answer(tmp_path: Path, browser: Any) -> None:
+def test_keys_turn_the_pages_and_show_the_answer(tmp_path, browser):
     lecture.write_slides(tmp_path / "slides.html")
     page = browser.new_page()
     page.goto((tmp_path / "slides.html").as_uri())

@@ -20,19 +20,7 @@ def arm() -> Robot:
     return fb.load("ur5", posture=lesson01.PRESSING_POSTURE)
 
 
-def test_a_servo_follows_its_path(arm: Robot) -> None:
-    state = with_floating_base(arm).standing()
-    path = lesson01.joint_turn(joint=2, angle=0.7, duration=1.5)
-    assert np.allclose(path(0.0), 0.0)
-    assert np.allclose(path(9.0), 0.7 * np.eye(6)[2])
-    circle = lesson01.joint_circle(0, 1, 1.0, 2.0)
-    assert np.allclose(circle(2.0), 0.0)
-    assert not np.allclose(circle(1.0), 0.0)
-    servo = joint_servo(state, np.arange(6.0), path, stiffness=10.0, damping=0.0)
-    assert np.allclose(servo(state.q, state.v, 9.0).tau, np.arange(6.0) + 7.0 * np.eye(6)[2])
-
-
-def test_a_servo_turns_back_joints_without_limits() -> None:
+def test_a_servo_turns_back_joints_without_limits():
     state = fb.load("kinova").standing()  # three of its joints are (cos, sin) in q
     turned = state.integrate(0.1 * np.eye(6)[0])
     assert np.allclose(joint_servo(state)(turned, state.v, 0.0).tau, -10.0 * np.eye(6)[0])
@@ -58,8 +46,6 @@ def outcome(pressing: Robot, width: float, press: float) -> str:
 
 
 @pytest.mark.parametrize(("part", "expected"), [(0.97, "fell"), (1.03, "completed")])
-def test_the_arm_stands_on_a_wide_plate_and_falls_from_a_narrow_one(
-    pressing: Robot, part: float, expected: str
-) -> None:
+def test_the_arm_stands_on_a_wide_plate_and_falls_from_a_narrow_one(pressing, part, expected):
     assert right("01.3", WIDE_ENOUGH)
     assert outcome(pressing, part * WIDE_ENOUGH, 120.0) == expected

@@ -6,19 +6,14 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.dynamics import dimensions
-from floatbase.lessons.lesson03 import (
-    beta_direction,
-    rising_solo8_eom,
-    upright_solo12,
-)
+from floatbase.lessons.lesson03 import beta_direction, rising_solo8_eom
 
 GO2 = fb.load("go2")
 # of the largest singular value: solo8 has 1e-2 above it, and rounding of 1e-16 below
 RANK_TOLERANCE = 1e-9
 
 
-def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce() -> None:
+def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce():
     eom = rising_solo8_eom()
     assert np.linalg.matrix_rank(eom.J, tol=RANK_TOLERANCE) == 10
     np.testing.assert_allclose(eom.J @ eom.state.v, 0.0, atol=1e-12)
@@ -32,9 +27,7 @@ def test_the_rising_solo8_has_a_drift_that_its_joints_can_produce() -> None:
     [tuple(f.frame for f in GO2.feet), ("FL_foot", "FR_foot", "RL_foot"), ("FL_foot",)],
     ids=len,
 )
-def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces(
-    frames: tuple[str, ...],
-) -> None:
+def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces(frames):
     contacts = fb.Contacts.points(GO2, mu=0.7).only(*frames)
     space = fb.feasible_space(fb.equations_of_motion(GO2.standing(), contacts))
     desired = [0.3, -0.2, 1.0, 0.1, 0.5, -0.4] if len(frames) != 1 else [0, 0, 1.0, 0, 0, 0]
@@ -42,14 +35,3 @@ def test_a_direction_moves_the_base_as_requested_with_the_least_change_of_forces
     np.testing.assert_allclose((space.qdd.A @ step)[:6], desired, atol=1e-9)
     free = np.linalg.svd(space.qdd.A[:6])[2][6:].T
     np.testing.assert_allclose((space.forces.A @ free).T @ (space.forces.A @ step), 0.0, atol=1e-7)
-
-
-@pytest.mark.parametrize("bend", [0.0, 0.5, 1.5])
-def test_upright_puts_every_foot_on_the_ground_below_its_hip(bend: float) -> None:
-    solo12 = fb.load("solo12")
-    state = upright_solo12(solo12, bend)
-    assert [round(foot, 9) for foot in fb.Contacts.points(solo12).positions(state)[:, 2]] == [
-        0.0
-    ] * 4
-    straight = dimensions(fb.equations_of_motion(state, fb.Contacts.points(solo12)))
-    assert straight.rank_J == (11 if bend == 0 else 12)

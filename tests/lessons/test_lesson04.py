@@ -32,7 +32,7 @@ def turn_cost(eom: Any) -> fb.Quadratic:
 
 
 @pytest.mark.parametrize("desired", [[0, 0.5, 0], [0.5, 0, 0], [0, 0, 1.0]])
-def test_the_engine_measures_the_desired_acceleration(desired: list[float]) -> None:
+def test_the_engine_measures_the_desired_acceleration(desired):
     contacts = fb.Contacts.points(GO2)
 
     def cost(eom: Any) -> fb.Quadratic:
@@ -46,7 +46,7 @@ def test_the_engine_measures_the_desired_acceleration(desired: list[float]) -> N
     np.testing.assert_allclose(measured_acceleration(record), desired, atol=0.01)
 
 
-def test_a_falling_robot_accelerates_with_gravity() -> None:
+def test_a_falling_robot_accelerates_with_gravity():
     sim = fb.Simulation(GO2)
     q = GO2.standing().q.copy()
     q[2] += 1.0

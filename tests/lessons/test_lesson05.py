@@ -19,12 +19,7 @@ from floatbase.lessons.lesson05 import (
     moving_and_goal_state,
     stretched_arm_state,
 )
-from floatbase.objectives import (
-    com_wrench_map,
-    normal_bias,
-    tangential_bias,
-    wrench_objective,
-)
+from floatbase.objectives import com_wrench_map, normal_bias, tangential_bias, wrench_objective
 
 GO2 = fb.load("go2")
 EOM = standing_go2_eom()
@@ -32,7 +27,7 @@ FORCE = np.array([60.0, 0.0, GO2.weight])  # N, world: of exercise 05.3
 ROUNDING = 1e-9  # of forces of 100 N and levers of 1 m
 
 
-def test_no_weights_solve_exercise_05_3() -> None:
+def test_no_weights_solve_exercise_05_3():
     """No α and no weight of (23) keeps both the wrench and the friction ratios, whatever the normal
     force it prefers.
     """
@@ -50,7 +45,7 @@ def test_no_weights_solve_exercise_05_3() -> None:
                 assert not right("05.3", design)
 
 
-def test_exercise_05_1_has_the_wrench_of_the_controller() -> None:
+def test_exercise_05_1_has_the_wrench_of_the_controller():
     """Its cost on the forces is zero where they give that wrench, but for (23)."""
     now, goal = moving_and_goal_state()
     controller = AnalyticController(GO2, EOM.contacts, goal, bias_weight=1e-12)
@@ -60,7 +55,7 @@ def test_exercise_05_1_has_the_wrench_of_the_controller() -> None:
 
 
 @pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
-def test_a_friction_ratio_is_tangential_over_normal_force(normal: list[float]) -> None:
+def test_a_friction_ratio_is_tangential_over_normal_force(normal):
     contacts = fb.Contacts.points(GO2, normals=normal)
     n, t = np.array(normal), np.array([0.0, 1.0, 0.0])
     forces = [10 * n + 5 * t, 10 * n, -10 * n + t, t]
@@ -69,7 +64,7 @@ def test_a_friction_ratio_is_tangential_over_normal_force(normal: list[float]) -
     )
 
 
-def test_the_arm_moves_the_centre_of_mass() -> None:
+def test_the_arm_moves_the_centre_of_mass():
     ahead, left, right_hand = (
         com_in_base(stretched_arm_state(turn)) for turn in (0.0, np.pi / 2, -np.pi / 2)
     )
@@ -81,13 +76,11 @@ def test_the_arm_moves_the_centre_of_mass() -> None:
     np.testing.assert_allclose(turned, expected, atol=ROUNDING)
 
 
-def test_the_engine_measures_the_planned_forces() -> None:
+def test_the_engine_measures_the_planned_forces():
     forces = inclined_design()(FORCE).minimiser()
-    record = fb.rollout(
-        fb.Simulation(GO2, 0.5), ConstantForceController(GO2, EOM.contacts, forces), 0.1
-    )
-    np.testing.assert_allclose(
-        record.measured[-1], forces, atol=1.0
-    )  # N: the robot has moved by 2 cm
+    controller = ConstantForceController(GO2, EOM.contacts, forces)
+    record = fb.rollout(fb.Simulation(GO2, 0.5), controller, 0.1)
+    # N: the robot has moved by 2 cm
+    np.testing.assert_allclose(record.measured[-1], forces, atol=1.0)
     np.testing.assert_allclose(record.planned[-1], forces, atol=ROUNDING)
     assert record.final.com_velocity[0] == pytest.approx(0.1 * 60.0 / GO2.mass, rel=0.03)

@@ -10,15 +10,10 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
-from floatbase.lessons.lessonA import (
-    elliptic_rotation,
-    figure_of_eight,
-    show_tumble,
-    tool_error,
-)
+from floatbase.lessons.lessonA import elliptic_rotation, figure_of_eight, show_tumble, tool_error
 
 
-def test_the_figure_of_eight_is_closed_and_its_rates_are_its_derivatives() -> None:
+def test_the_figure_of_eight_is_closed_and_its_rates_are_its_derivatives():
     path, d = figure_of_eight(fb.load("ur5").standing(), 3.0), 1e-4
     for t in (0.0, 0.7, 2.1):
         (before, v0, _), (now, v, a), (after, v1, _) = path(t - d), path(t), path(t + d)
@@ -27,7 +22,7 @@ def test_the_figure_of_eight_is_closed_and_its_rates_are_its_derivatives() -> No
         assert np.allclose((v1 - v0) / (2 * d), a, atol=1e-5)
 
 
-def test_the_error_of_the_tool_is_its_distance_from_the_path() -> None:
+def test_the_error_of_the_tool_is_its_distance_from_the_path():
     robot = fb.load("ur5")
     start = robot.standing()
     sim = fb.Simulation(robot)
@@ -41,9 +36,7 @@ def test_the_error_of_the_tool_is_its_distance_from_the_path() -> None:
 
 
 @pytest.mark.parametrize("phase", [90.0, -90.0, 0.0])
-def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(
-    phase: float,
-) -> None:
+def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivatives(phase):
     path, d = elliptic_rotation(0.3, 0.35, 0.6, 6, phase), 1e-4
     for t in (0.0, 10.0, 12.0):
         R, omega, alpha = path(t)
@@ -58,7 +51,7 @@ def test_a_circling_base_begins_and_ends_at_rest_and_its_rates_are_its_derivativ
     assert np.allclose(abs(angles).max(axis=0), [0.3, 0.35], atol=1e-3)
 
 
-def test_a_tumble_has_the_same_acceleration_in_both_frames() -> None:
+def test_a_tumble_has_the_same_acceleration_in_both_frames():
     view, mass = fb.Viewer(judges.load("go2")), judges.load("go2").mass
     try:
         fast, slow, still = (show_tumble(view, *rates) for rates in ((3, 2), (1, 2), (3, 0)))

@@ -9,12 +9,7 @@ import numpy as np
 import pytest
 
 from floatbase.actuators import Cylinders, HydraulicActuators, Hydraulics
-from floatbase.lessons.lessonB import (
-    Bench,
-    hold_then_turn,
-    push_response,
-    run_force_loop,
-)
+from floatbase.lessons.lessonB import Bench, hold_then_turn, run_force_loop
 
 ROBOT = judges.load("go2")
 KNEE = ROBOT.joint_names.index("FL_calf_joint")
@@ -30,7 +25,7 @@ def knee(hydraulics: Hydraulics) -> HydraulicActuators:
     return actuators
 
 
-def test_the_bench_equals_the_knee_of_go2() -> None:
+def test_the_bench_equals_the_knee_of_go2():
     """Turned fast, out of reach, boiling: 0.4 s."""
     bandwidth, speed, wanted, supply = 1.0, 15.0, 12.0, 60e5
     hydraulics = Hydraulics(loop_bandwidth=bandwidth, supply_pressure=supply)
@@ -47,7 +42,7 @@ def test_the_bench_equals_the_knee_of_go2() -> None:
         )
 
 
-def test_the_bench_has_the_torque_rate_of_the_cylinders() -> None:
+def test_the_bench_has_the_torque_rate_of_the_cylinders():
     cylinders, angle = HydraulicActuators(ROBOT).cylinders, 0.4
     bench = Bench(lambda t: (angle, 0.0))
     geometry = cylinders.geometry(cylinders.max_lever_angle + angle)
@@ -58,30 +53,3 @@ def test_the_bench_has_the_torque_rate_of_the_cylinders() -> None:
         leaking = cylinders.pressure_rates(np.zeros(12), pressures, geometry, np.zeros(12))
         change = geometry.lever * cylinders.force(rates - leaking)
         assert bench.torque_rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
-
-
-def test_the_joint_is_held_then_turned_then_held() -> None:
-    motion = hold_then_turn(2.0, start=0.1, end=0.6)
-    assert (
-        motion(0.05) == (0.0, 0.0)
-        and motion(0.3) == pytest.approx((0.4, 2.0))
-        and motion(0.9) == (0.6, 0.0)
-    )
-
-
-def test_a_valve_opens_at_most_completely() -> None:
-    wide, full = Bench(), Bench()
-    wide.step(7.0)
-    full.step(1.0)
-    assert (
-        wide.samples == full.samples
-        and wide.samples[-1].u == 1.0
-        and wide.samples[-1].time == pytest.approx(1e-3)
-    )
-
-
-def test_a_stiffer_spring_reduces_the_offset_of_leaking_motors() -> None:
-    soft, stiff = push_response(100.0, 20.0), push_response(250.0, 20.0)
-    assert soft.outcome == stiff.outcome == "completed"
-    assert 2.0 < soft.offset / stiff.offset < 4.0
-    assert soft.offset > 3.0 and max(soft.oscillation, stiff.oscillation) < 1.0

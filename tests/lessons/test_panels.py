@@ -43,9 +43,7 @@ def slider_of(
 
 
 @pytest.mark.parametrize(("low", "first", "high", "step"), RANGES)
-def test_a_slider_shows_the_numbers_that_are_computed_with(
-    view: fb.Viewer, low: float, first: float, high: float, step: float
-) -> None:
+def test_a_slider_shows_the_numbers_that_are_computed_with(view, low, first, high, step):
     slider, drawn = slider_of(view, low, first, high)
     assert slider.step == pytest.approx(step, rel=1e-12)
     for bound in (low, first, high):
@@ -54,26 +52,23 @@ def test_a_slider_shows_the_numbers_that_are_computed_with(
     assert drawn == [first]
     for i in range(60):
         slider.value = min(low + i * slider.step, high)  # as a browser adds them up
-        assert format(drawn[-1], slider.readout_format) == format(
-            slider.value, slider.readout_format
-        )
+        shown = format(slider.value, slider.readout_format)
+        assert format(drawn[-1], slider.readout_format) == shown
         assert drawn[-1] == round(drawn[-1], 4)
     assert len(drawn) > 50
 
 
-def test_bounds_that_are_not_round_get_a_fine_step(view: fb.Viewer) -> None:
+def test_bounds_that_are_not_round_get_a_fine_step(view):
     slider, drawn = slider_of(view, 0.0, 2.0 / 3.0, 3.14159)
     assert slider.step <= 1e-4
     assert drawn[0] == pytest.approx(2.0 / 3.0, abs=1e-4)
 
 
-def test_a_range_may_have_no_width(view: fb.Viewer) -> None:
+def test_a_range_may_have_no_width(view):
     assert slider_of(view, 2.0, 2.0, 2.0)[1] == [2.0]
 
 
-def test_a_slider_names_its_unit_and_the_note_shows_errors(
-    view: fb.Viewer,
-) -> None:
+def test_a_slider_names_its_unit_and_the_note_shows_errors(view):
     def draw(push_force: float) -> str:
         if push_force:
             raise fb.FloatbaseError("too hard")
@@ -89,7 +84,7 @@ def test_a_slider_names_its_unit_and_the_note_shows_errors(
 
 
 @pytest.mark.parametrize("beside", [False, True])
-def test_a_displayed_panel_holds_its_picture(view: fb.Viewer, beside: bool) -> None:
+def test_a_displayed_panel_holds_its_picture(view, beside):
     panel: SliderPanel = slider_panel(view, lambda x: None, beside=beside, x=(0.0, 1.0, 2.0))
     picture = (panel.children[0].children if beside else panel.children)[0]
     assert picture.children == ()
@@ -97,20 +92,15 @@ def test_a_displayed_panel_holds_its_picture(view: fb.Viewer, beside: bool) -> N
     assert picture.children[0].name == view.robot.name and "image/png" in data
 
 
-def test_a_slider_of_integers_has_only_integers() -> None:
+def test_a_slider_of_integers_has_only_integers():
     panel = slider_panel(None, lambda rounds: f"{rounds:g}", rounds=range(31))
     slider = panel.sliders["rounds"]
-    assert (slider.min, slider.value, slider.max, slider.step, slider.readout_format) == (
-        0,
-        0,
-        30,
-        1,
-        ".0f",
-    )
+    assert (slider.min, slider.value, slider.max, slider.step) == (0, 0, 30, 1)
+    assert slider.readout_format == ".0f"
     assert {value % 1 for value in panel_samples(panel)["rounds"]} == {0.0}
 
 
-def test_a_panel_without_a_view_shows_the_result_of_its_function() -> None:
+def test_a_panel_without_a_view_shows_the_result_of_its_function():
     panel = slider_panel(None, lambda x: f"<img alt='{x:.1f}'>", x=(0.0, 1.0, 2.0))
     panel._repr_mimebundle_()
     assert panel.view is None and panel.children == (panel.note, panel.sliders["x"])
@@ -122,15 +112,13 @@ class Pushed:
     """What a reader can touch of a push panel, and the run behind it."""
 
     def __init__(self, robot: fb.Robot):
-        controller = fb.WholeBodyController(
-            robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
-        )
+        contacts, tasks = fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
+        controller = fb.WholeBodyController(robot, contacts, tasks)
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
         self.run: LiveSimulation = live_run(self.sim, controller, self.view)
-        _, self.force, row, self.speed, buttons = push_panel(
-            self.run, self.view, max_force=600.0
-        ).children
+        panel = push_panel(self.run, self.view, max_force=600.0)
+        _, self.force, row, self.speed, buttons = panel.children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
         self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}
@@ -157,22 +145,20 @@ def panel() -> Iterator[Pushed]:
         (30.0, 30.0, (np.sqrt(0.75), 0.5, 0), "pushed with 30 N towards 30° for 0.1 s"),
     ],
 )
-def test_a_push_has_the_direction_of_the_handle(
-    panel: Pushed, force: float, towards: float, way: tuple[float, ...], words: str
-) -> None:
+def test_a_push_has_the_direction_of_the_handle(panel, force, towards, way, words):
     panel.towards.value = towards
     panel.force.value = force
     assert panel.line.value == words and panel.run.status == "running"
     until(lambda: panel.arrow is not None)
     start = time.monotonic()
-    arrow = panel.arrow
-    assert arrow is not None
-    np.testing.assert_allclose(arrow, panel.view.scale * abs(force) * np.array(way), atol=1e-9)
+    np.testing.assert_allclose(
+        panel.arrow, panel.view.scale * abs(force) * np.array(way), atol=1e-9
+    )
     until(lambda: panel.arrow is None)
     assert time.monotonic() - start > 0.3
 
 
-def test_the_button_pushes_again_and_refuses_a_push_of_zero(panel: Pushed) -> None:
+def test_the_button_pushes_again_and_refuses_a_push_of_zero(panel):
     panel.push.click()
     assert panel.line.value == "The push is 0 N. Set the force first."
     assert panel.run.status == "paused"
@@ -185,14 +171,13 @@ def test_the_button_pushes_again_and_refuses_a_push_of_zero(panel: Pushed) -> No
     until(lambda: panel.arrow is not None)
 
 
-def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel: Pushed) -> None:
+def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel):
     async def drag(newtons: float, towards: float) -> None:
         url = panel.view.window.web_url.replace("http", "ws") + "socket"
         client = await tornado.websocket.websocket_connect(url)
         for name, value in {"towards [°]": towards, "push [N]": newtons}.items():
-            await client.write_message(
-                json.dumps({"type": "control", "name": name, "value": value})
-            )
+            message = {"type": "control", "name": name, "value": value}
+            await client.write_message(json.dumps(message))
         while panel.arrow is None:
             await asyncio.sleep(0.01)
         client.close()
@@ -204,7 +189,7 @@ def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel: Pushed)
         until(lambda: panel.arrow is None)
 
 
-def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel: Pushed) -> None:
+def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel):
     panel.towards.value = 60.0
     panel.force.value = 600.0
     until(lambda: panel.line.value == "fell: press reset, or push again")
@@ -218,7 +203,7 @@ def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel: Pushed) -> No
     assert panel.line.value == "running"
 
 
-def test_a_push_after_a_fall_starts_the_run_again(panel: Pushed) -> None:
+def test_a_push_after_a_fall_starts_the_run_again(panel):
     told = "pushed with 600 N towards 60° for 0.1 s"
     panel.towards.value = 60.0
     panel.force.value = 600.0
@@ -228,7 +213,7 @@ def test_a_push_after_a_fall_starts_the_run_again(panel: Pushed) -> None:
         assert panel.line.value == told and panel.run.status == "running"
 
 
-def test_time_can_be_slowed_down(panel: Pushed) -> None:
+def test_time_can_be_slowed_down(panel):
     panel.speed.value = 0.1
     panel.run.start()
     until(lambda: panel.sim.time > 0.05)

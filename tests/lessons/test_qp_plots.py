@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from messages import raises, refused
+from messages import raises
 
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.lessons import qp_plots
@@ -18,32 +18,21 @@ BOX = (-3.0, 3.0, -2.0, 3.0)
 NONE = np.zeros((0, 2)), np.zeros(0)
 
 
-def qp_of(H: Any, g: Any, G: Any, h: Any, names: Any = ()) -> QP:
+def qp_of(H: Any, g: Any, G: Any, h: Any) -> QP:
     """A QP of two variables without equalities."""
-    return QP(
-        np.asarray(H),
-        np.asarray(g),
-        *NONE,
-        np.reshape(G, (-1, 2)),
-        np.asarray(h),
-        inequality_names=names,
-    )
+    G = np.reshape(G, (-1, 2))
+    return QP(np.asarray(H), np.asarray(g), *NONE, G, np.asarray(h))
 
 
 def random_qp(seed: int) -> QP:
     rng = np.random.default_rng(seed)
     rows = int(rng.integers(1, 7))
-    return QP(
-        np.eye(2),
-        rng.normal(size=2),
-        *NONE,
-        rng.normal(size=(rows, 2)),
-        rng.uniform(-0.3, 2.0, rows),
-    )
+    g, G, h = rng.normal(size=2), rng.normal(size=(rows, 2)), rng.uniform(-0.3, 2.0, rows)
+    return QP(np.eye(2), g, *NONE, G, h)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed: int) -> None:
+def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed):
     qp = random_qp(seed)
     corners = qp_plots.feasible_polygon(qp, BOX)
     assert np.all(corners @ qp.G.T <= qp.h + 1e-9)
@@ -55,17 +44,13 @@ def test_the_feasible_polygon_is_the_part_of_the_box_within_the_constraints(seed
         assert inside == (len(corners) > 2 and bool(np.all(turns >= 0.0)))
 
 
-def test_infeasible_constraints_have_no_polygon() -> None:
-    assert (
-        len(qp_plots.feasible_polygon(qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1]), BOX))
-        == 0
-    )
+def test_infeasible_constraints_have_no_polygon():
+    qp = qp_of(np.eye(2), [0, 0], [[1, 0], [-1, 0]], [-1, -1])
+    assert len(qp_plots.feasible_polygon(qp, BOX)) == 0
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_normals_times_multipliers_add_up_to_the_negative_gradient(
-    seed: int,
-) -> None:
+def test_normals_times_multipliers_add_up_to_the_negative_gradient(seed):
     qp = random_qp(seed)
     try:
         x = solve(qp).x
@@ -81,13 +66,10 @@ def test_normals_times_multipliers_add_up_to_the_negative_gradient(
     plt.close("all")
 
 
-def test_a_level_curve_has_one_value_of_the_cost() -> None:
+def test_a_level_curve_has_one_value_of_the_cost():
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
-    for qp in (
-        qp_of(H, [1.0, -0.5], [], []),
-        table_top(),
-        qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], []),
-    ):
+    flat = qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], [])
+    for qp in (qp_of(H, [1.0, -0.5], [], []), table_top(), flat):
         axis: Any = qp_plots.plot(qp, BOX)
         curves = [path for path in axis.collections[0].get_paths() if len(path.vertices)]
         spread = [np.ptp([qp.objective(point) for point in path.vertices]) for path in curves]
@@ -97,19 +79,13 @@ def test_a_level_curve_has_one_value_of_the_cost() -> None:
     plt.close("all")
 
 
-def test_only_problems_in_the_plane_are_accepted() -> None:
+def test_only_problems_in_the_plane_are_accepted():
     with raises(InputError, "QP", 3):
-        qp_plots.plot(
-            QP(np.eye(3), np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)), np.zeros(0))
-        )
+        none = np.zeros((0, 3)), np.zeros(0)
+        qp_plots.plot(QP(np.eye(3), np.zeros(3), *none, *none))
     with raises(InputError, "QP", 2, 1):
         qp_plots.plot(QP(np.eye(2), np.zeros(2), np.eye(1, 2), np.zeros(1), *NONE))
-    refused(
-        lambda: qp_plots.plot(table_top(), working_set=["tabel"]),
-        UnknownNameError,
-        "tabel",
-        "table",
-    )
-    refused(
-        lambda: qp_plots.plot(table_top(), (1.0, -1.0, 0.0, 2.0)), InputError, "box", 1, -1, 0, 2
-    )
+    with raises(UnknownNameError, "tabel", "table"):
+        qp_plots.plot(table_top(), working_set=["tabel"])
+    with raises(InputError, "box", 1, -1, 0, 2):
+        qp_plots.plot(table_top(), (1.0, -1.0, 0.0, 2.0))

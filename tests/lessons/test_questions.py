@@ -38,9 +38,7 @@ def read(
     return questions.all_questions.__wrapped__()
 
 
-def test_a_question_is_read_from_the_text_above_its_cell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_question_is_read_from_the_text_above_its_cell(tmp_path, monkeypatch):
     (found,) = read(tmp_path, monkeypatch, recall=True).values()
     assert found == questions.Question(
         "11.a", "Wheels", "A wheel rolls.", "how large are the two forces?",
@@ -48,22 +46,18 @@ def test_a_question_is_read_from_the_text_above_its_cell(
     )  # fmt: skip
 
 
-def test_metadata_replaces_the_text_of_a_question(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_metadata_replace_the_text_of_a_question(tmp_path, monkeypatch):
     (found,) = read(tmp_path, monkeypatch, context="A ball.", text="Which forces?").values()
     assert (found.context, found.text) == ("A ball.", "Which forces?")
 
 
 @pytest.mark.parametrize("metadata", [{"recal": True}, {"recall": "yes"}, {"reason": 3}])
-def test_wrong_metadata_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, metadata: dict[str, Any]
-) -> None:
+def test_wrong_metadata_are_named(tmp_path, monkeypatch, metadata):
     with pytest.raises(InputError, match=rf"11\.a.*{next(iter(metadata))}"):
         read(tmp_path, monkeypatch, **metadata)
 
 
-def test_every_question_with_metadata_is_used_outside_its_lesson() -> None:
+def test_every_question_with_metadata_is_used_outside_its_lesson():
     cells = [
         cell
         for path in lesson_notebooks().values()
@@ -82,21 +76,21 @@ class Row:
     text: str = ""
 
 
-def test_tables_are_read_and_line_breaks_in_texts_are_spaces(tmp_path: Path) -> None:
+def test_tables_are_read_and_line_breaks_in_texts_are_spaces(tmp_path):
     path = tmp_path / "rows.toml"
     path.write_text("[[row]]\nname = 'a'\ntext = '''\none\ntwo'''\n[[row]]\nname = 'b'\n")
     assert records(read_toml(path)["row"], Row) == [Row("a", "one two"), Row("b")]
 
 
 @pytest.mark.parametrize("row", ["text = 'x'", "name = 'a'\ntitle = 'b'"])
-def test_rows_with_wrong_or_missing_entries_are_named(tmp_path: Path, row: str) -> None:
+def test_rows_with_wrong_or_missing_entries_are_named(tmp_path, row):
     path = tmp_path / "rows.toml"
     path.write_text(f"[[row]]\n{row}\n")
     with pytest.raises(InputError, match="name|title"):
         records(read_toml(path)["row"], Row)
 
 
-def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
+def test_a_file_that_is_not_toml_is_named(tmp_path):
     path = tmp_path / "rows.toml"
     path.write_text("[[row\n")
     with pytest.raises(InputError, match=r"rows\.toml"):

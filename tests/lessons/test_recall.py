@@ -27,15 +27,11 @@ START = datetime(2026, 3, 2, 9, tzinfo=UTC)
 WEEKS = {0: "00", 1: "01", 7: "02", 9: "03", 14: "04", 21: "05"}  # day -> lesson of that day
 
 
-@pytest.fixture(autouse=True)
-def home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """Of a learner who has just begun."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
-def write(home: Path, entries: list[dict[str, Any]]) -> None:
-    (home / "progress.jsonl").write_text("\n".join(json.dumps(entry) for entry in entries))
+def write(learner: Path, entries: list[dict[str, Any]]) -> None:
+    (learner / "progress.jsonl").write_text("\n".join(json.dumps(entry) for entry in entries))
 
 
 def settled(name: str, day: float, right: bool, sure: bool | None = None) -> dict[str, Any]:
@@ -45,7 +41,7 @@ def settled(name: str, day: float, right: bool, sure: bool | None = None) -> dic
     return {name: entry | ({} if sure is None else {"sure": sure})}
 
 
-def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read() -> None:
+def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read():
     known = all_questions()
     assert len(RECALLED) >= 40
     assert len(known) > 140
@@ -56,7 +52,7 @@ def test_the_course_has_at_least_forty_questions_to_recall_and_they_can_be_read(
         assert "**" not in text and "Predict" not in text
 
 
-def test_four_weeks_of_a_learner(home: Path) -> None:
+def test_four_weeks_of_a_learner(learner):
     """A learner who knows two of three answers works through a lesson now and then."""
     random = np.random.default_rng(1)
     known = all_questions()
@@ -65,7 +61,7 @@ def test_four_weeks_of_a_learner(home: Path) -> None:
     asked: dict[str, list[tuple[int, bool]]] = {}
     per_day = []
     for day in range(28):
-        write(home, entries)
+        write(learner, entries)
         now = START + timedelta(days=day, hours=1)
         today = due_questions(now)
         per_day.append(len(today))
@@ -82,58 +78,54 @@ def test_four_weeks_of_a_learner(home: Path) -> None:
     assert per_day[0] == 0 and max(per_day) == PER_DAY
     assert sum(per_day) > 28  # more than a question a day
     assert len(asked) > 12
-    pauses: dict[bool, list[int]] = {True: [], False: []}
-    for days in asked.values():
-        for (before, right), (after, _) in pairwise(days):
-            pauses[right].append(after - before)
-    assert min(pauses[True]) >= 2 and min(pauses[False]) >= 1
-    assert np.mean(pauses[True]) > np.mean(pauses[False])
+    pauses = [(right, b - a) for days in asked.values() for (a, right), (b, _) in pairwise(days)]
+    known_pauses, missed_pauses = ([p for right, p in pauses if right is r] for r in (True, False))
+    assert min(known_pauses) >= 2 and min(missed_pauses) >= 1
+    assert np.mean(known_pauses) > np.mean(missed_pauses)
 
 
 @pytest.mark.parametrize(
     ("right", "sure", "hours"),
     [(True, None, 48), (False, None, 24), (False, True, 12), (True, True, 48)],
 )
-def test_a_question_rests_according_to_its_last_answer(
-    home: Path, right: bool, sure: bool | None, hours: int
-) -> None:
-    write(home, [settled("02.d", 0, right, sure)])
+def test_a_question_rests_according_to_its_last_answer(learner, right, sure, hours):
+    write(learner, [settled("02.d", 0, right, sure)])
     for off, asked in ((-1, []), (1, ["02.d"])):
         now = START + timedelta(hours=hours + off)
         assert [question.name for question in due_questions(now)] == asked
 
 
-def test_right_answers_double_the_pause(home: Path) -> None:
+def test_right_answers_double_the_pause(learner):
     entries, day = [settled("02.d", 0, True)], 2.0
     for pause in (4.0, 8.0, 16.0):
         time = (START + timedelta(days=day)).isoformat()
         entries.append({"02.d": {"recalled": 1.0, "knew": True, "time": time}})
-        write(home, entries)
+        write(learner, entries)
         assert due_questions(START + timedelta(days=day + pause - 0.1)) == []
         assert len(due_questions(START + timedelta(days=day + pause + 0.1))) == 1
         day += pause
 
 
-def test_what_was_missed_comes_first_and_lessons_are_mixed(home: Path) -> None:
+def test_what_was_missed_comes_first_and_lessons_are_mixed(learner):
     names = ["01.a", "01.b", "01.d", "02.d", "03.h"]
-    write(home, [settled(name, 0, name != "03.h") for name in names])
+    write(learner, [settled(name, 0, name != "03.h") for name in names])
     asked = [question.name for question in due_questions(START + timedelta(days=5))]
     assert asked == ["03.h", "01.a", "02.d"]
 
 
-def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(home: Path) -> None:
+def test_a_lettered_lesson_asks_nothing_that_was_not_taught_before(learner):
     """Lesson A needs lessons 01 and 02 only, so a learner may open it right after these."""
     known = all_questions()
     entries = [settled(name, 0, False) for name in known if known[name].lesson in ("01", "02")]
     unseen = {"said": 1.0, "time": START.isoformat()}  # predicted, result not seen yet
-    write(home, [*entries, *({name: unseen} for name in known if known[name].lesson == "A")])
+    write(learner, [*entries, *({name: unseen} for name in known if known[name].lesson == "A")])
     now = START + timedelta(days=30)
     asked = due_questions(now)
     assert len(asked) == PER_DAY
     assert {question.lesson for question in asked} == {"01", "02"}
 
 
-def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_answers_are_told_and_kept(learner, capsys):
     recall()
     assert "nothing to recall" in capsys.readouterr().out
     predict("02.d", 10, unit="N")
@@ -156,12 +148,10 @@ def test_answers_are_told_and_kept(home: Path, capsys: pytest.CaptureFixture[str
     assert progress.predictions()["02.d"]["said"] == 10  # predictions stay as they were
 
 
-def test_the_command_asks_what_is_due(
-    home: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_asks_what_is_due(learner, monkeypatch, capsys):
     entry = {"said": 5, "is": [18, 12], "unit": "", "time": "2026-01-01T00:00:00+00:00"}
     guess = {"01.e": {"said": "true", "is": "false"}}
-    write(home, [{"01.d": entry}, settled("02.d", -60, False), guess])
+    write(learner, [{"01.d": entry}, settled("02.d", -60, False), guess])
     answers = iter(["18, 12", "", "__import__('os')"])
     monkeypatch.setattr("builtins.input", lambda prompt: next(answers))
     assert floatbase.__main__.main(["recall"]) == 0
@@ -201,14 +191,14 @@ def time_of(day: float) -> str:
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-def test_the_site_asks_what_recall_asks(home: Path) -> None:
+def test_the_site_asks_what_recall_asks(learner):
     """due.js and `due_questions` on the same forty histories."""
     random = np.random.default_rng(2)
     data = site.recall.recall_data([])
     cases, expected = [], []
     for count in [*range(10), *[20, 46] * 15]:
         names = [str(name) for name in random.choice(RECALLED, count, replace=False)]
-        write(home, random_history(random, names, data["questions"]))
+        write(learner, random_history(random, names, data["questions"]))
         expected.append([question.name for question in due_questions(START)])
         cases.append(progress.history())
     assert {len(names) for names in expected} == {0, 1, 2, 3}
@@ -226,7 +216,7 @@ def test_the_site_asks_what_recall_asks(home: Path) -> None:
     assert json.loads(ran.stdout) == expected
 
 
-def test_the_page_knows_every_question_and_its_result() -> None:
+def test_the_page_knows_every_question_and_its_result():
     data = site.recall.recall_data([NOTEBOOKS / "02_equations_of_motion.ipynb"])
     assert list(data["questions"]) == RECALLED
     for name, question in data["questions"].items():
@@ -236,10 +226,12 @@ def test_the_page_knows_every_question_and_its_result() -> None:
         assert question["address"] == in_02
 
 
-def test_damaged_times_and_answers_do_no_harm(home: Path) -> None:
+def test_damaged_times_and_answers_do_no_harm(learner):
     for time in ("", "x", 5, None, "9999-12-31T23:59"):
-        write(home, [{"02.d": {"said": 1.0, "is": 2.0, "unit": "N", "time": time}}])
+        write(learner, [{"02.d": {"said": 1.0, "is": 2.0, "unit": "N", "time": time}}])
         due_questions()
-    write(home, [{"02.d": {"said": "text", "is": 2.0}}, {"02.d": {"recalled": 3, "knew": "yes"}}])
+    write(
+        learner, [{"02.d": {"said": "text", "is": 2.0}}, {"02.d": {"recalled": 3, "knew": "yes"}}]
+    )
     assert [question.name for question in due_questions()] == ["02.d"]
     assert not is_right("text", 2.0, "")

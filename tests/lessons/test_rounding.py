@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -30,11 +28,11 @@ SECOND_ROUNDING = 1e-5  # relative: what the first rounding, to six digits, adds
         (np.inf, "infinite"), (-np.inf, "minus infinite"), (np.array(3.0), "3"),
     ],
 )  # fmt: skip
-def test_a_number_has_two_digits_and_no_minus_zero(number: Any, text: str) -> None:
+def test_a_number_has_two_digits_and_no_minus_zero(number, text):
     assert rounded(number) == text
 
 
-def test_unit_digits_and_floor_can_be_chosen() -> None:
+def test_unit_digits_and_floor_can_be_chosen():
     assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == (
         "69 mm",
         "30°",
@@ -53,27 +51,27 @@ def test_unit_digits_and_floor_can_be_chosen() -> None:
         ([np.nan, 1.0], "(not a number, 1)"),
     ],
 )  # fmt: skip
-def test_small_entries_of_an_array_are_zero(numbers: Any, text: str) -> None:
+def test_small_entries_of_an_array_are_zero(numbers, text):
     assert rounded(numbers) == text
 
 
-def test_an_array_without_a_floor_keeps_its_smallest_entries() -> None:
+def test_an_array_without_a_floor_keeps_its_smallest_entries():
     assert rounded([1.0, 3e-14], floor=0.0) == "(1, 3e-14)"
 
 
 @pytest.mark.parametrize("half", [12.5, 2.45, 0.125, 1.05, 99.5, 0.355, 1.55, -0.0655])
-def test_halves_are_rounded_away_from_zero_for_all_last_bits(half: float) -> None:
+def test_halves_are_rounded_away_from_zero_for_all_last_bits(half):
     assert rounded(half * (1 - LAST_BITS)) == rounded(half) == rounded(half * (1 + LAST_BITS))
     assert abs(float(rounded(half))) > abs(half)
 
 
 @given(st.floats(1e-3, 1e9) | st.floats(-1e9, -1e-3))
-def test_the_text_is_close_to_the_number(x: float) -> None:
+def test_the_text_is_close_to_the_number(x):
     assert float(rounded(x)) == pytest.approx(x, rel=HALF_A_STEP + SECOND_ROUNDING)
     assert float(rounded(x, digits=12)) == pytest.approx(x, rel=1e-11)  # half of the twelfth digit
 
 
 @pytest.mark.parametrize("nothing", [True, [True, False], "69", None, 1j, {}, [1.0, "x"]])
-def test_values_without_numbers_are_refused(nothing: Any) -> None:
+def test_values_without_numbers_are_refused(nothing):
     with pytest.raises(InputError, match="must be a number or an array of numbers"):
         rounded(nothing)

@@ -21,13 +21,7 @@ from floatbase.lessons import all_exercises, check, hand_in, predict, progress
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, write_solutions
 from floatbase.lessons.publish.__main__ import main
 
-
-@pytest.fixture(autouse=True)
-def learner(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """One who has just begun, in a folder of their own."""
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "home"))
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("learner")
 
 
 def through_a_file(answer: Any) -> Any:
@@ -36,17 +30,13 @@ def through_a_file(answer: Any) -> Any:
 
 def same(a: Any, b: Any) -> bool:
     if isinstance(a, fb.Quadratic):
-        return (
-            isinstance(b, fb.Quadratic)
-            and bool(np.array_equal(a.H, b.H) and np.array_equal(a.g, b.g))
-            and a.c == b.c
-        )
+        a, b = (a.H, a.g, a.c), (b.H, b.g, b.c)
     if isinstance(a, tuple):
         return isinstance(b, tuple) and all(same(*pair) for pair in zip(a, b, strict=True))
     return bool(np.array_equal(a, b))
 
 
-def test_a_file_keeps_every_kind_of_answer_to_the_last_bit() -> None:
+def test_a_file_keeps_every_kind_of_answer_to_the_last_bit():
     placeholders = {name: exercise.placeholder() for name, exercise in all_exercises().items()}
     answers = {name: answer for name, answer in placeholders.items() if not callable(answer)}
     assert len(answers) > 30
@@ -54,42 +44,33 @@ def test_a_file_keeps_every_kind_of_answer_to_the_last_bit() -> None:
     assert [name for name, answer in answers.items() if not same(answer, back[name])] == []
 
 
-def test_a_file_keeps_odd_answers_in_some_form() -> None:
+def test_a_file_keeps_odd_answers_in_some_form():
     endless: list[Any] = []
     endless.append(endless)
     for odd in [*ODD.values(), endless, np.zeros((1000, 1000)), lambda x: x]:
         json.dumps(progress.as_json(odd))
 
 
-def test_grading_judges_the_answers_and_not_the_claims_of_a_file(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_grading_judges_the_answers_and_not_the_claims_of_a_file(learner, capsys):
     for answer in (3.0, LIFTED, 4.0):
         check("00.1", answer)
     check("03.1", 5)
     predict("02.c", 12.5, unit="mm")
     path = hand_in("Ada Lovelace")
     assert path.name == "answers-Ada_Lovelace.json" and "1 of" in capsys.readouterr().out
-    marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
+    graded = grades.grade_file(path)
+    marks = {mark.exercise: mark for mark in graded.results}
     assert (marks["00.1"].result, marks["00.1"].tries) == ("right", 3)
-    assert (marks["03.1"].result, marks["01.1"].result, grades.grade_file(path).predicted) == (
-        "wrong",
-        "·",
-        1,
-    )
-
+    assert (marks["03.1"].result, marks["01.1"].result, graded.predicted) == ("wrong", "·", 1)
     claimed = json.loads(path.read_text())
     claimed["exercises"]["00.1"]["answer"] = 7.0
     claimed["exercises"]["01.1"] = {"tries": 1, "right": 1, "answer": [0.0, 0.0, 0.0]}
     path.write_text(json.dumps(claimed))
-    assert {
-        mark.result for mark in grades.grade_file(path).results if mark.exercise in ("00.1", "01.1")
-    } == {"wrong"}
+    marks = {mark.exercise: mark for mark in grades.grade_file(path).results}
+    assert marks["00.1"].result == marks["01.1"].result == "wrong"
 
 
-def test_hand_in_asks_to_check_again_answers_that_were_not_kept(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_hand_in_asks_to_check_again_answers_that_were_not_kept(learner, capsys):
     progress.append("00.1", {"tries": 1, "right": 1})
     progress.append("99.1", {"tries": 1, "right": 1})  # of another course
     hand_in("Ada")
@@ -100,7 +81,7 @@ def test_hand_in_asks_to_check_again_answers_that_were_not_kept(
     assert "once more" not in capsys.readouterr().out
 
 
-def test_grading_shows_code_and_never_runs_it(learner: Path) -> None:
+def test_grading_shows_code_and_never_runs_it(learner):
     ran = []
 
     def row_to_drop(W: Any, prices: Any) -> None:
@@ -111,10 +92,8 @@ def test_grading_shows_code_and_never_runs_it(learner: Path) -> None:
     path = hand_in("Ada")
     out = grades.code_to_read([grades.grade_file(path)])
     assert len(ran) == before > 0
-    assert "    def row_to_drop" in out and "--- Ada, C.3" in out
-    assert [line for line in out.splitlines() if not line.startswith("    ") and line.strip()] == [
-        "--- Ada, C.3"
-    ]
+    assert "    def row_to_drop" in out
+    assert [line for line in out.splitlines() if line[:4].strip()] == ["--- Ada, C.3"]
 
 
 HOSTILE = (
@@ -125,31 +104,25 @@ HOSTILE = (
 
 
 @pytest.mark.parametrize("kept", HOSTILE, ids=range(len(HOSTILE)))
-def test_grading_accepts_an_answer_of_any_form(learner: Path, kept: Any) -> None:
+def test_grading_accepts_an_answer_of_any_form(learner, kept):
     entry = {"tries": 1, "right": 1, "answer": kept}
     found = {"form": "answers to the floatbase course", "name": "\x1b[2J=1", "predictions": {}}
     path = learner / "a.json"
-    path.write_text(
-        json.dumps(found | {"exercises": dict.fromkeys(all_exercises(), entry) | {"99.1": 5}})
-    )
+    exercises = dict.fromkeys(all_exercises(), entry) | {"99.1": 5}
+    path.write_text(json.dumps(found | {"exercises": exercises}))
     handed_in = grades.grade_file(path)
     assert {mark.result for mark in handed_in.results} == {"wrong"}
     assert handed_in.name.isprintable()
 
 
 NO_FILE = (
-    "",
-    "null",
-    "[]",
-    "{",
-    '{"form": 5}',
-    "[" * 100_000,
+    "", "null", "[]", "{", '{"form": 5}', "[" * 100_000,
     '{"form": "answers to the floatbase course", "name": 5}',
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("text", NO_FILE, ids=range(len(NO_FILE)))
-def test_grading_refuses_files_that_hand_in_did_not_write(learner: Path, text: str) -> None:
+def test_grading_refuses_files_that_hand_in_did_not_write(learner, text):
     (learner / "a.json").write_text(text)
     with pytest.raises(InputError, match="was not written by hand_in"):
         grades.grade_file(learner / "a.json")
@@ -157,7 +130,7 @@ def test_grading_refuses_files_that_hand_in_did_not_write(learner: Path, text: s
         grades.grade_file(learner / "none.json")
 
 
-def test_hand_in_needs_an_answer_a_name_and_a_folder(learner: Path) -> None:
+def test_hand_in_needs_an_answer_a_name_and_a_folder(learner):
     with pytest.raises(InputError, match="nothing to hand in yet"):
         hand_in("Ada")
     check("00.1", 3.0)
@@ -169,7 +142,7 @@ def test_hand_in_needs_an_answer_a_name_and_a_folder(learner: Path) -> None:
     assert hand_in("../../Ada").parent == Path(".")
 
 
-def test_a_class_becomes_one_table(learner: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_class_becomes_one_table(learner, capsys):
     check("00.1", LIFTED)
     files = [str(hand_in(name)) for name in ("Ada", "Émilie du Châtelet", "=1+1", "a;=2")]
     (learner / "holiday.json").write_text("{}")
@@ -188,21 +161,18 @@ def test_a_class_becomes_one_table(learner: Path, capsys: pytest.CaptureFixture[
         grades.grade_files([learner / "holiday.json"])
 
 
-def test_a_pipe_or_a_device_among_the_files_is_reported(
-    learner: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pipe_or_a_device_among_the_files_is_reported(learner, capsys):
     check("00.1", LIFTED)
     os.mkfifo(learner / "pipe.json")
     (learner / "zero.json").symlink_to("/dev/zero")
     good = hand_in("Ada")
     found, unread = grades.grade_files([learner / "pipe.json", learner / "zero.json", good])
     assert [one.name for one in found] == ["Ada"] and unread == 2
-    assert {"pipe.json", "zero.json"} <= {
-        Path(line.split()[0]).name for line in capsys.readouterr().err.splitlines()
-    }
+    told = capsys.readouterr().err
+    assert "pipe.json" in told and "zero.json" in told
 
 
-def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None:
+def test_learners_with_similar_names_keep_their_own_files(learner):
     check("00.1", LIFTED)
     (learner / "answers-A_B.json").write_text("notes")
     names = ["A.B", "A B", "A_B"]
@@ -216,9 +186,7 @@ def test_learners_with_similar_names_keep_their_own_files(learner: Path) -> None
     assert hand_in("Eve").name == "answers-Eve-3.json"
 
 
-def test_learners_with_similar_names_can_hand_in_at_once(
-    learner: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_learners_with_similar_names_can_hand_in_at_once(learner, monkeypatch):
     check("00.1", LIFTED)
     submission = sys.modules[hand_in.__module__]
     write = submission.write_whole
@@ -235,13 +203,13 @@ def test_learners_with_similar_names_can_hand_in_at_once(
 
 
 @pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
-def test_hand_in_refuses_a_folder_that_is_not_a_path(learner: Path, folder: Any) -> None:
+def test_hand_in_refuses_a_folder_that_is_no_path(learner, folder):
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):
         hand_in("Ada", folder)
 
 
-def test_the_last_of_two_files_of_a_learner_counts(learner: Path) -> None:
+def test_the_last_of_two_files_of_a_learner_counts(learner):
     check("00.1", LIFTED)
     files = []
     for time in ("2026-05-02T10:00:00+00:00", "2026-05-01T10:00:00+00:00"):
@@ -258,7 +226,7 @@ def test_the_last_of_two_files_of_a_learner_counts(learner: Path) -> None:
         assert {one.file for one in found} == kept
 
 
-def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner: Path) -> None:
+def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner):
     for answer in (1.0, 2.0):
         check("00.1", answer)
     assert progress.answers() == {"00.1": 2.0}
@@ -267,20 +235,19 @@ def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner: Path) -> N
     assert progress.answers() == {"00.1": LIFTED}
 
 
-def test_lessons_for_teachers_hold_the_solutions(learner: Path) -> None:
+def test_lessons_for_teachers_hold_the_solutions(learner):
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     path = learner / "solutions" / f"{lesson.stem}.solved.ipynb"
     assert write_solutions(path.parent, [lesson]) == [f"{path.name}: new"]
     cells = read_notebook(path).cells
     solutions = {name: e.solution for name, e in all_exercises().items() if name.startswith("02.")}
-    assert {
-        c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata
-    } == solutions
+    shown = {c.metadata["exercise"]: c.source for c in cells if "exercise" in c.metadata}
+    assert shown == solutions
     explained = sum(bool(all_exercises()[name].explanation) for name in solutions)
     assert len(cells) == len(read_notebook(lesson).cells) + explained
 
 
-def test_annotated_solutions_are_kept(learner: Path) -> None:
+def test_annotated_solutions_are_kept(learner):
     lesson = NOTEBOOKS / "02_equations_of_motion.ipynb"
     write_solutions(learner, [lesson])
     assert write_solutions(learner, [lesson]) == []
@@ -296,7 +263,7 @@ def test_annotated_solutions_are_kept(learner: Path) -> None:
     assert (learner / f"{lesson.stem}.solved.new.ipynb").read_text() != annotated
 
 
-def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
+def test_a_table_replaces_only_an_earlier_table(learner):
     """`grade --table *.json`, without the name of the table, must not cost a learner's answers."""
     check("00.1", 3.0)
     answers, table = hand_in("Ada"), learner / "marks.csv"
@@ -309,7 +276,7 @@ def test_a_table_replaces_only_an_earlier_table(learner: Path) -> None:
     assert len(table.read_text().splitlines()) > len(all_exercises())
 
 
-def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner: Path) -> None:
+def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner):
     check("00.1", 3.0)
     path = hand_in("Ada")
     kept = path.read_bytes()
@@ -324,14 +291,13 @@ def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner: Path) -> 
         ["run", "nowhere.ipynb"],
         ["run", "text"],
         ["run", "."],
+        ["site", "no.ipynb", "--to", "site"],
         ["solutions", "--to", "text"],
         ["grade", "text", "--before", "0001-01-01T00:00"],
         ["grade", "text", "--before", "9999-12-31T23:59"],
     ],
 )
-def test_the_command_line_ends_with_a_message_and_no_traceback(
-    learner: Path, arguments: list[str]
-) -> None:
+def test_the_command_line_ends_with_a_message_and_no_traceback(learner, arguments):
     (learner / "text").write_text("no notebook")
     with pytest.raises(SystemExit) as ended:
         main(arguments)

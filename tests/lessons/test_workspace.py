@@ -55,62 +55,51 @@ def update(course: Path, n: int = 2) -> None:
     (course / "page.md").write_text(f"a page, {n}")
 
 
-def test_a_copy_has_no_outputs(course: Path) -> None:
+def test_a_copy_has_no_outputs(course):
     write(course / LESSON, "first = 1", output="1\n")
     prepare_workspace(course)
     assert nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells[0].outputs == []
 
 
-def test_a_copy_keeps_predictions_and_folded_claims(course: Path) -> None:
-    question = new_code_cell(
-        'predict("00.a", ..., unit="mm")', metadata={"tags": ["predict"], "prediction": "00.a"}
-    )
-    claims = new_code_cell(
-        "assert True", metadata={"tags": ["claims"], "jupyter": {"source_hidden": True}}
-    )
-    question.outputs = [
-        new_output("stream", text="00.a: skipped. You can go on without a prediction.")
-    ]
+def test_a_copy_keeps_predictions_and_folded_claims(course):
+    predicts = {"tags": ["predict"], "prediction": "00.a"}
+    question = new_code_cell('predict("00.a", ..., unit="mm")', metadata=predicts)
+    folded = {"tags": ["claims"], "jupyter": {"source_hidden": True}}
+    claims = new_code_cell("assert True", metadata=folded)
     nbformat.write(new_notebook(cells=[question, claims]), course / LESSON)
     prepare_workspace(course)
     copied = nbformat.read(course / MY_FOLDER / LESSON, as_version=4).cells
-    assert [(cell.source, cell.metadata) for cell in copied] == [
-        (cell.source, cell.metadata) for cell in (question, claims)
-    ]
-    assert copied[0].outputs == []
+    assert [cell.source for cell in copied] == [question.source, claims.source]
+    assert [cell.metadata for cell in copied] == [predicts, folded]
 
     copied[0].source = 'predict("00.a", 40, unit="mm")'
     nbformat.write(new_notebook(cells=copied), course / MY_FOLDER / LESSON)
     update(course)
     prepare_workspace(course)
-    assert (
-        source(course / MY_FOLDER / LESSON) == copied[0].source
-    )  # what was predicted is the learner's writing
+    # what was predicted is the learner's writing
+    assert source(course / MY_FOLDER / LESSON) == copied[0].source
 
 
-def test_a_lesson_is_copied_once_and_then_left_alone(course: Path) -> None:
+def test_a_lesson_is_copied_once_and_then_left_alone(course):
     assert prepare_workspace(course) == [f"{LESSON}: new"]
     write(course / MY_FOLDER / LESSON, "first = 'my answer'")
     assert prepare_workspace(course) == []
     assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
 
 
-def test_learners_of_one_installed_course_have_separate_copies(
-    course: Path, tmp_path: Path
-) -> None:
+def test_learners_of_one_installed_course_have_separate_copies(course, tmp_path):
     folders = [tmp_path / "homes" / name / "course" for name in ("ada", "bob")]
     for folder in folders:
         assert prepare_workspace(course, folder) == [f"{LESSON}: new"]
     write(folders[0] / LESSON, "first = 'my answer'")
     write(course / LESSON, "first = 2")
-    assert prepare_workspace(course, folders[0]) == [
-        f"{LESSON}: your copy is kept; the new text is in {NEW}"
-    ]
+    (told,) = prepare_workspace(course, folders[0])
+    assert told == f"{LESSON}: your copy is kept; the new text is in {NEW}"
     assert prepare_workspace(course, folders[1]) == [f"{LESSON}: updated"]
     assert not (course / MY_FOLDER).exists()
 
 
-def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path: Path) -> None:
+def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path):
     course, program = tmp_path / "notebooks", tmp_path / "examples" / "wbc.py"
     for folder in (course, program.parent):
         folder.mkdir()
@@ -120,15 +109,12 @@ def test_the_program_that_lesson_07_names_is_copied_beside_the_lessons(tmp_path:
     assert (course / MY_FOLDER / "wbc.py").read_text() == program.read_text()
 
 
-def test_a_package_without_lessons_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError,
-        match=r"There are no lessons in .*notebooks\. Install floatbase from its repository",
-    ):
+def test_a_package_without_lessons_is_refused(tmp_path):
+    with pytest.raises(InputError, match="notebooks"):
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
 
-def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
+def test_a_newer_lesson_replaces_one_that_was_only_run(course):
     prepare_workspace(course)
     write(course / MY_FOLDER / LESSON, "first = 1", output="1\n")
     write(course / LESSON, "first = 2")
@@ -137,16 +123,15 @@ def test_a_newer_lesson_replaces_one_that_was_only_run(course: Path) -> None:
 
 
 @pytest.mark.parametrize("forget", [False, True])
-def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) -> None:
+def test_newer_lessons_are_put_beside_edited_copies(mine, forget):
     """Whichever file the learner continues in, and also when the record of copies is lost."""
     write(mine / LESSON, "first = 'my answer'")
     for n, name in ((2, NEW), (3, NEW2)):
         update(mine.parent, n)
         if forget:
             (mine / ".from.json").unlink()
-        assert f"{LESSON}: your copy is kept; the new text is in {name}" in prepare_workspace(
-            mine.parent
-        )
+        told = f"{LESSON}: your copy is kept; the new text is in {name}"
+        assert told in prepare_workspace(mine.parent)
         assert source(mine / name) == f"first = {n}"
         write(mine / name, f"first = 'an hour of work in {name}'")
         (mine / "page.md").write_text("my notes")
@@ -158,9 +143,7 @@ def test_newer_lessons_are_put_beside_edited_copies(mine: Path, forget: bool) ->
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_an_unedited_new_text_is_updated_and_not_restored_once_removed(
-    mine: Path,
-) -> None:
+def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(mine):
     write(mine / LESSON, "first = 'my answer'")
     for n in (2, 3):
         update(mine.parent, n)
@@ -172,43 +155,28 @@ def test_an_unedited_new_text_is_updated_and_not_restored_once_removed(
     assert not (mine / NEW).exists()
 
 
+PICTURE = {"a.png": {"image/png": "AAAA"}}
+RUN = {"execution_count": 3, "outputs": [new_output("stream", text="1")]}
+LOOKS = {
+    "execution": {"iopub.status.busy": "now"}, "jupyter": {"source_hidden": True},
+    "collapsed": True, "scrolled": True, "trusted": True,
+}  # fmt: skip
+KERNEL = {"kernelspec": {"name": "p", "display_name": "P"}, "widgets": {"a": 1}}
 CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
-    "an attached picture": (
-        True,
-        lambda book: book.cells[0].update(attachments={"a.png": {"image/png": "AAAA"}}),
-    ),
+    "an attached picture": (True, lambda book: book.cells[0].update(attachments=PICTURE)),
     "a tag": (True, lambda book: book.cells[0].metadata.update(tags=["mine"])),
     "a title": (True, lambda book: book.metadata.update(title="mine")),
     "a cell": (True, lambda book: book.cells.append(new_code_cell("mine"))),
     "another kind of cell": (True, lambda book: book.cells[0].update(cell_type="raw")),
     "an empty cell, as after Shift+Enter": (False, lambda book: book.cells.append(new_code_cell())),
-    "a run": (
-        False,
-        lambda book: book.cells[0].update(
-            execution_count=3, outputs=[new_output("stream", text="1")]
-        ),
-    ),
-    "times and looks": (
-        False,
-        lambda book: book.cells[0].metadata.update(
-            execution={"iopub.status.busy": "now"},
-            collapsed=True,
-            scrolled=True,
-            trusted=True,
-            jupyter={"source_hidden": True},
-        ),
-    ),
-    "a kernel": (
-        False,
-        lambda book: book.metadata.update(
-            kernelspec={"name": "p", "display_name": "P"}, widgets={"a": 1}
-        ),
-    ),
+    "a run": (False, lambda book: book.cells[0].update(RUN)),
+    "times and looks": (False, lambda book: book.cells[0].metadata.update(LOOKS)),
+    "a kernel": (False, lambda book: book.metadata.update(KERNEL)),
 }
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_only_edits_of_a_learner_count_as_writing(course: Path, change: str) -> None:
+def test_only_edits_of_a_learner_count_as_writing(course, change):
     counts, make = CHANGES[change]
     prepare_workspace(course)
     copy = course / MY_FOLDER / LESSON
@@ -222,18 +190,9 @@ def test_only_edits_of_a_learner_count_as_writing(course: Path, change: str) -> 
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "null",
-        "5",
-        "[1]",
-        '{"00_a.ipynb": [1]}',
-        "[" * 100_000,
-        "",
-        "\0",
-    ],
+    "text", ["null", "5", "[1]", '{"00_a.ipynb": [1]}', "[" * 100_000, "", "\0"]
 )
-def test_a_damaged_record_keeps_everything_written(mine: Path, text: str) -> None:
+def test_a_damaged_record_keeps_everything_written(mine, text):
     (mine / LESSON).write_text("half a noteb")
     (mine / ".from.json").write_text(text)
     update(mine.parent)
@@ -255,13 +214,13 @@ def folder(path: Path) -> None:
     path.mkdir()
 
 
+def written(text: str) -> Callable[[Path], object]:
+    return lambda mine: (mine.parent / LESSON).write_text(text)
+
+
 OBSTACLES: dict[str, Callable[[Path], object]] = {
-    "a merge conflict in the course": lambda mine: (mine.parent / LESSON).write_text(
-        "<<<<<<< HEAD\n{}"
-    ),
-    "another form of JSON in the course": lambda mine: (mine.parent / LESSON).write_text(
-        '{"cells": [5], "metadata": null}'
-    ),
+    "a merge conflict in the course": written("<<<<<<< HEAD\n{}"),
+    "another form of JSON in the course": written('{"cells": [5], "metadata": null}'),
     "a broken link in the course": lambda mine: linked(mine.parent / LESSON, mine / "nowhere"),
     "a folder": lambda mine: folder(mine / LESSON),
     "a broken link": lambda mine: linked(mine / LESSON, mine.parent / "nowhere.ipynb"),
@@ -270,9 +229,7 @@ OBSTACLES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("obstacle", OBSTACLES)
-def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(
-    mine: Path, obstacle: str
-) -> None:
+def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(mine, obstacle):
     update(mine.parent)
     OBSTACLES[obstacle](mine)
     before = files(mine)
@@ -285,7 +242,7 @@ def test_an_obstacle_to_one_file_is_reported_and_the_others_are_updated(
     assert not (mine.parent / "nowhere.ipynb").exists()
 
 
-def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
+def test_links_are_neither_followed_nor_replaced(mine):
     (mine.parent / "elsewhere").mkdir()
     for name in (LESSON, "page.md", NEW):
         kept = mine.parent / "elsewhere" / name
@@ -294,9 +251,8 @@ def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
     before = {path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()}
     update(mine.parent)
     prepare_workspace(mine.parent)
-    assert {
-        path.name: path.read_bytes() for path in (mine.parent / "elsewhere").iterdir()
-    } == before
+    for name, content in before.items():
+        assert (mine.parent / "elsewhere" / name).read_bytes() == content
     assert all((mine / name).is_symlink() for name in before)
     assert source(mine / NEW2) == "first = 2"
 
@@ -304,15 +260,13 @@ def test_links_are_neither_followed_nor_replaced(mine: Path) -> None:
 @pytest.mark.parametrize(
     "make", [lambda path: path.write_text("mine"), lambda path: path.symlink_to("nowhere")]
 )
-def test_a_folder_that_cannot_be_created_is_reported(
-    course: Path, make: Callable[[Path], object]
-) -> None:
+def test_a_folder_that_cannot_be_created_is_reported(course, make):
     make(course / MY_FOLDER)
     with pytest.raises(InputError, match="can write to"):
         prepare_workspace(course)
 
 
-def test_a_full_disk_keeps_whole_files_and_later_updates(mine: Path) -> None:
+def test_a_full_disk_keeps_whole_files_and_later_updates(mine):
     long = "x" * 10_000
     write(mine.parent / LESSON, long)
     with full_disk(5_000):  # room for the record, none for the lesson
@@ -324,7 +278,7 @@ def test_a_full_disk_keeps_whole_files_and_later_updates(mine: Path) -> None:
     assert (source(mine / LESSON), source(mine / NEW)) == ("first = 'my answer'", long)
 
 
-def test_a_copy_has_the_form_that_jupyter_writes(course: Path, tmp_path: Path) -> None:
+def test_a_copy_has_the_form_that_jupyter_writes(course, tmp_path):
     """So that saving without a change changes nothing."""
     prepare_workspace(course)
     copy, again = course / MY_FOLDER / LESSON, tmp_path / "again"
@@ -332,15 +286,8 @@ def test_a_copy_has_the_form_that_jupyter_writes(course: Path, tmp_path: Path) -
     assert copy.read_text(encoding="utf-8") == again.read_text(encoding="utf-8")
 
 
-def test_preparing_a_workspace_imports_no_heavy_package() -> None:
+def test_preparing_a_workspace_imports_no_heavy_package():
     heavy = ("mujoco", "meshcat", "matplotlib", "ipywidgets", "nbformat", "nbclient", "mistune")
-    code = (
-        f"import sys, floatbase.lessons.publish.__main__; print([m for m in {heavy} if m in "
-        f"sys.modules])"
-    )
-    assert (
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout
-        == "[]\n"
-    )
+    loaded = f"print([m for m in {heavy} if m in sys.modules])"
+    code = f"import sys, floatbase.lessons.publish.__main__; {loaded}"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"

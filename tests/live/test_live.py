@@ -22,7 +22,7 @@ TARGET_TOLERANCE = 1e-9  # of all targets and bounds of a walk
 WALK_TOLERANCE = 5e-3  # m, of the centre of mass of a walk that is pushed, over all its time
 
 
-def test_the_control_step_is_up_to_date() -> None:
+def test_the_control_step_is_up_to_date():
     assert wasm.is_current(), "live/tick.wasm is older than its sources: run `make live`"
 
 
@@ -31,7 +31,7 @@ def test_the_control_step_is_up_to_date() -> None:
 @pytest.mark.skipif(
     None in (wasm.linker(), wasm.library()), reason="lld or wasi-libc is not installed"
 )
-def test_the_control_step_compiles_to_an_equal_module(tmp_path: Path) -> None:
+def test_the_control_step_compiles_to_an_equal_module(tmp_path):
     """A module that is compiled here gives the same answers as the one that is kept."""
     wasm.build(tmp_path / "tick.wasm")
     assert _compare(tmp_path, tmp_path / "tick.wasm")["states"]["torque"] < TORQUE_TOLERANCE
@@ -42,7 +42,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return _compare(tmp_path_factory.mktemp("live"), wasm.MODULE)
 
 
-def test_all_states_have_the_same_answers(found: dict[str, Any]) -> None:
+def test_all_states_have_the_same_answers(found):
     states = found["states"]
     assert states["states"] == 600
     assert states["infeasible"] > 0 and states["active"] > states["states"]
@@ -50,11 +50,11 @@ def test_all_states_have_the_same_answers(found: dict[str, Any]) -> None:
     assert states["torque"] < TORQUE_TOLERANCE
 
 
-def test_mujoco_gives_the_inputs_that_pinocchio_gives(found: dict[str, Any]) -> None:
+def test_mujoco_gives_the_inputs_that_pinocchio_gives(found):
     assert max(found["states"]["inputs"].values()) < INPUT_TOLERANCE
 
 
-def test_runs_follow_those_of_the_library(found: dict[str, Any]) -> None:
+def test_runs_follow_those_of_the_library(found):
     outcomes = {run["python"] for run in found["runs"]}
     assert outcomes == {"completed", "fell", "controller failed"}
     for run in found["runs"]:
@@ -63,7 +63,7 @@ def test_runs_follow_those_of_the_library(found: dict[str, Any]) -> None:
         assert run["moved"] > 0.0
 
 
-def test_walks_have_the_targets_of_the_library(found: dict[str, Any]) -> None:
+def test_walks_have_the_targets_of_the_library(found):
     """Every step of a trot that turns and stops, and of a walk, for the same states."""
     for walk in found["walks"]:
         assert walk["inputs"] < TARGET_TOLERANCE, walk
@@ -71,7 +71,7 @@ def test_walks_have_the_targets_of_the_library(found: dict[str, Any]) -> None:
         assert walk["distance"] < WALK_TOLERANCE < walk["moved"], walk
 
 
-def test_a_push_recovery_map_is_that_of_the_library(found: dict[str, Any]) -> None:
+def test_a_push_recovery_map_is_that_of_the_library(found):
     """Within a step of the bisection."""
     recovery = found["recovery"]
     for push, expected in zip(recovery["pushes"], recovery["python"], strict=True):

@@ -6,7 +6,7 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
-from messages import refused
+from messages import raises
 
 import floatbase as fb
 from floatbase.errors import InputError
@@ -30,15 +30,12 @@ def solved(
     )
     command = controller(state.q, state.v)
     assert command.backend == "reference"
-    return fb.equations_of_motion(state, contacts), {
-        "qdd": command.qdd,
-        "tau": command.tau,
-        "forces": command.forces.ravel(),
-    }
+    found = {"qdd": command.qdd, "tau": command.tau, "forces": command.forces.ravel()}
+    return fb.equations_of_motion(state, contacts), found
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed: int) -> None:
+def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed):
     state = moving(seed)
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     heavy, data = state.robot.model.copy(), state.robot.model.createData()
@@ -48,29 +45,21 @@ def test_mass_and_the_parts_of_h_equal_those_of_another_model(seed: int) -> None
     M = pin.crba(heavy, data, state.q)
     M = np.triu(M) + np.triu(M, 1).T
     h = pin.nonLinearEffects(heavy, heavy.createData(), state.q, state.v)
+    rounding = ROUNDING * np.abs(h).max()
     assert np.allclose(assumed.M, M, rtol=0.0, atol=ROUNDING * np.abs(M).max())
-    assert np.allclose(assumed.h, h, rtol=0.0, atol=ROUNDING * np.abs(h).max())
+    assert np.allclose(assumed.h, h, rtol=0.0, atol=rounding)
     weightless = state.robot.model.copy()
     weightless.gravity = pin.Motion.Zero()
     velocity = pin.nonLinearEffects(weightless, weightless.createData(), state.q, state.v)
-    assert np.allclose(
-        ModelMismatch(gravity=False).assumed_equations(eom).h,
-        velocity,
-        rtol=0.0,
-        atol=ROUNDING * np.abs(h).max(),
-    )
-    still = pin.computeGeneralizedGravity(
-        state.robot.model, state.robot.model.createData(), state.q
-    )
-    assert np.allclose(
-        ModelMismatch(velocity_forces=False).assumed_equations(eom).h,
-        still,
-        rtol=0.0,
-        atol=ROUNDING * np.abs(h).max(),
-    )
+    assumed = ModelMismatch(gravity=False).assumed_equations(eom)
+    assert np.allclose(assumed.h, velocity, rtol=0.0, atol=rounding)
+    model = state.robot.model
+    still = pin.computeGeneralizedGravity(model, model.createData(), state.q)
+    assumed = ModelMismatch(velocity_forces=False).assumed_equations(eom)
+    assert np.allclose(assumed.h, still, rtol=0.0, atol=rounding)
 
 
-def test_the_default_is_exact_and_changes_nothing() -> None:
+def test_the_default_is_exact_and_changes_nothing():
     state = moving()
     controller = judges.controller_of("go2")
     qp, eom = controller.qp(state), fb.equations_of_motion(state, controller.contacts)
@@ -78,23 +67,22 @@ def test_the_default_is_exact_and_changes_nothing() -> None:
     assert not ModelMismatch(drift=False).is_exact
 
 
-def test_a_plan_without_drift_has_zero_a_qdd() -> None:
+def test_a_plan_without_drift_has_zero_a_qdd():
     eom, x = solved(ModelMismatch(drift=False), moving())
     assert np.allclose(eom.A @ x["qdd"], 0.0, atol=1e-8)
     assert np.abs(eom.b).max() > 0.1  # m/s²: the neglected drift
 
 
-def test_an_ignored_contact_exerts_no_force_in_the_plan() -> None:
+def test_an_ignored_contact_exerts_no_force_in_the_plan():
     eom, x = solved(ModelMismatch(ignored_contacts=["FR_foot"]), moving())
     part = eom.contacts.force_slice("FR_foot")
     others = np.array(x["forces"])
     others[part] = 0.0
-    assert np.allclose(
-        eom.M @ x["qdd"] + eom.h - eom.S @ x["tau"] - eom.J.T @ others, 0.0, atol=1e-6
-    )
+    missing, _ = eom.residual(x["qdd"], x["tau"], others)
+    assert np.allclose(missing, 0.0, atol=1e-6)
 
 
-def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows() -> None:
+def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows():
     eom, x = solved(ModelMismatch(underactuated=False), moving())
     missing, _ = eom.residual(x["qdd"], x["tau"], x["forces"])
     assert np.allclose(missing[6:], 0.0, atol=1e-6)
@@ -103,7 +91,7 @@ def test_a_plan_with_motors_of_the_base_satisfies_only_the_joint_rows() -> None:
     )
 
 
-def test_feet_pull_in_a_plan_without_cones() -> None:
+def test_feet_pull_in_a_plan_without_cones():
     robot, down = judges.load("go2"), np.array([0.0, 0.0, -30.0])
     state, contacts = robot.standing(), judges.stance(robot)
     tasks = [fb.CoMTask(state.com, acceleration=down), *fb.standing_tasks(state)[1:]]
@@ -117,17 +105,14 @@ def test_feet_pull_in_a_plan_without_cones() -> None:
     assert normals[False].sum() == pytest.approx(robot.mass * (9.81 - 30.0), rel=0.2)
 
 
-def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
+def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk():
     robot, mismatch = judges.load("go2"), ModelMismatch(mass=1.1)
     controller = fb.WholeBodyController(
         robot, judges.stance(robot), fb.standing_tasks(robot.standing()), modify_qp=mismatch
     )
     lifted = controller.replace(contacts=controller.contacts.without("FL_foot"))
-    assert (
-        lifted.problem.modify_qp is mismatch
-        and lifted.backend == "reference"
-        and "modify_qp" in lifted.backend_reason
-    )
+    assert lifted.problem.modify_qp is mismatch and lifted.backend == "reference"
+    assert "modify_qp" in lifted.backend_reason
     state = robot.standing()
     qp = lifted.qp(state)
     tau, forces = solve(qp)["tau"], solve(qp)["forces"]
@@ -135,10 +120,6 @@ def test_a_model_mismatch_survives_a_change_of_stance_and_a_walk() -> None:
     assert np.all(np.isfinite(tau)) and carried == pytest.approx(1.1 * robot.weight, rel=0.05)
 
 
-def test_a_single_name_is_refused_and_the_error_shows_a_list() -> None:
-    refused(
-        lambda: ModelMismatch(ignored_contacts="FR_foot"),
-        InputError,
-        "ignored_contacts",
-        'such as ["FR_foot"]',
-    )
+def test_a_single_name_is_refused_and_the_error_shows_a_list():
+    with raises(InputError, "ignored_contacts", 'such as ["FR_foot"]'):
+        ModelMismatch(ignored_contacts="FR_foot")
