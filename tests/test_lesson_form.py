@@ -182,7 +182,7 @@ def test_a_lesson_ends_with_a_review_of_its_predictions(path):
 
 
 @LESSONS
-def test_all_lessons_but_the_first_begin_with_recall(path):
+def test_all_lessons_except_the_first_begin_with_recall(path):
     recalls = [i for i, cell in enumerate(code(path)) if cell.source.startswith("recall()")]
     assert recalls == ([] if path.stem.startswith("00") else [1])  # after the imports
 

@@ -174,7 +174,7 @@ def test_an_exercise_without_an_answer_gets_its_own_verdict():
         assert not verdict.right and "no answer yet" in verdict.text, name
 
 
-def test_run_and_store_keeps_the_output_and_counts_no_try_of_a_learner(tmp_path):
+def test_run_and_store_keeps_the_output_and_does_not_count_as_a_try(tmp_path):
     spoken = 'import sys\nprint("of this run", file=sys.stderr)\nprint("of the lesson")'
     tried = 'from floatbase.lessons import check, progress\ncheck("00.1", 1.0)'
     shown = "print(progress.load(), progress.path())"

@@ -29,7 +29,7 @@ from floatbase.qp import active_set, solve
 # exercises ----------------------------------------------------------------------------------------
 
 
-def test_stubs_with_functions_count_no_try(monkeypatch, tmp_path):
+def test_stubs_with_functions_are_not_tries(monkeypatch, tmp_path):
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
     for name in ("C.2", "C.3", "C.4"):
         made: dict[str, Any] = {}

@@ -100,7 +100,7 @@ def test_equal_seeds_give_equal_cases_and_other_seeds_give_others():
         assert np.array_equal(getattr(box, name), getattr(again, name))
 
 
-def test_a_box_holds_nothing_but_the_record():
+def test_a_black_box_contains_only_the_record():
     names = {"name", "robot", "contacts", "time", "q", "v", "measured", "tau", "planned", "qdd"}
     assert {field.name for field in fields(BlackBox)} == names
     for case, box in cases(1):

@@ -235,7 +235,7 @@ def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path):
     assert "a<b" not in html and '"s"' not in html
 
 
-def test_the_playground_of_a_site_stands_still(go2):
+def test_the_playground_on_a_site_is_a_still_picture(go2):
     from floatbase.playground import playground
 
     field = playground("go2")
@@ -375,7 +375,7 @@ def test_a_sample_looks_the_same_after_any_other(page):
 
 @pytest.mark.front_end
 @needs_chromium
-def test_a_recording_plays_on_request_and_rests_out_of_sight(page):
+def test_a_recording_plays_on_request_and_pauses_out_of_sight(page):
     frame = inside(page, 1)
     assert frame.evaluate("viewer.animator.playing") is False
     assert frame.evaluate("viewer.animator.duration") == pytest.approx(0.2, abs=0.01)

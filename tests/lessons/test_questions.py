@@ -46,13 +46,13 @@ def test_a_question_is_read_from_the_text_above_its_cell(tmp_path, monkeypatch):
     )  # fmt: skip
 
 
-def test_metadata_replace_the_text_of_a_question(tmp_path, monkeypatch):
+def test_metadata_replaces_the_text_of_a_question(tmp_path, monkeypatch):
     (found,) = read(tmp_path, monkeypatch, context="A ball.", text="Which forces?").values()
     assert (found.context, found.text) == ("A ball.", "Which forces?")
 
 
 @pytest.mark.parametrize("metadata", [{"recal": True}, {"recall": "yes"}, {"reason": 3}])
-def test_wrong_metadata_are_named(tmp_path, monkeypatch, metadata):
+def test_wrong_metadata_is_named(tmp_path, monkeypatch, metadata):
     with pytest.raises(InputError, match=rf"11\.a.*{next(iter(metadata))}"):
         read(tmp_path, monkeypatch, **metadata)
 

@@ -203,7 +203,7 @@ def test_learners_with_similar_names_can_hand_in_at_once(learner, monkeypatch):
 
 
 @pytest.mark.parametrize("folder", [5, None, "a\0b", "\ud800", ["."]])
-def test_hand_in_refuses_a_folder_that_is_no_path(learner, folder):
+def test_hand_in_refuses_a_folder_that_is_not_a_path(learner, folder):
     check("00.1", LIFTED)
     with pytest.raises(InputError, match="folder"):
         hand_in("Ada", folder)

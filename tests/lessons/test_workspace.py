@@ -143,7 +143,7 @@ def test_newer_lessons_are_put_beside_edited_copies(mine, forget):
     assert (mine / "page.md").read_text() == "my notes"
 
 
-def test_an_unedited_new_text_is_updated_and_stays_away_once_removed(mine):
+def test_an_unedited_new_text_is_updated_and_not_restored_once_removed(mine):
     write(mine / LESSON, "first = 'my answer'")
     for n in (2, 3):
         update(mine.parent, n)
