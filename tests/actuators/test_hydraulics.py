@@ -30,10 +30,10 @@ def joints(hydraulics: Hydraulics = HYQ) -> HydraulicActuators:
 
 
 def run(
-    actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3
+    actuators: HydraulicActuators, tau: np.ndarray, time: float, dt: float = 1e-3, turn: float = 0.0
 ) -> np.ndarray:
-    """Torques after each step with the joints held at their best angles, shape (n, d)."""
-    q, v = actuators.cylinders.max_lever_angle, np.zeros(actuators.cylinders.d)
+    """Torques after each step with the joints held at an angle from the best, shape (n, d)."""
+    q, v = actuators.cylinders.max_lever_angle + turn, np.zeros(actuators.cylinders.d)
     return np.array([actuators.step(tau, q, v, dt) for _ in range(round(time / dt))])
 
 
@@ -72,13 +72,13 @@ def test_the_lever_is_the_derivative_of_the_length_so_that_power_is_the_same_on_
 
 
 def test_the_lever_is_longest_at_the_centre_and_zero_where_crank_and_cylinder_line_up():
-    cylinder = one()
-    levers = np.array([cylinder.geometry([q]).lever[0] for q in np.linspace(-np.pi, np.pi, 2001)])
-    assert levers.max() == pytest.approx(HYQ.crank, rel=1e-6)
-    assert cylinder.geometry([0.0]).lever[0] == pytest.approx(HYQ.crank, rel=1e-12)
-    assert cylinder.geometry([-np.arccos(HYQ.crank / HYQ.base)]).lever[0] == pytest.approx(
-        0.0, abs=1e-12
-    )
+    def lever(q: float) -> float:
+        return float(one().geometry([q]).lever[0])
+
+    longest = max(lever(q) for q in np.linspace(-np.pi, np.pi, 2001))
+    assert longest == pytest.approx(HYQ.crank, rel=1e-6)
+    assert lever(0.0) == pytest.approx(HYQ.crank, rel=1e-12)
+    assert lever(-np.arccos(HYQ.crank / HYQ.base)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_chambers_take_up_what_the_piston_leaves_and_never_vanish():
@@ -305,24 +305,17 @@ def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward(
     """±0.3 rad at 2 Hz, 3.8 rad/s: within 6 % of the torque limit; a spring of oil alone would give
     100 times that.
     """
-    actuators = joints()
-    robot, cylinders = judges.load("go2"), actuators.cylinders
-    tau = 0.3 * robot.torque_limits
+    actuators, limits = joints(), judges.load("go2").torque_limits
+    best, tau = actuators.cylinders.max_lever_angle, 0.3 * limits
     run(actuators, tau, 0.2)
     worst, dt = np.zeros(12), 1e-3
     for i in range(1000):
-        phase = 2.0 * np.pi * 2.0 * i * dt
-        q = cylinders.max_lever_angle + 0.3 * np.sin(phase)
-        v = np.full(12, 0.3 * 4.0 * np.pi * np.cos(phase))
-        ramp = min(1.0, i / 100.0)  # set off gently
-        q, v = cylinders.max_lever_angle + ramp * (q - cylinders.max_lever_angle), ramp * v
-        worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / robot.torque_limits)
-    spring = (
-        0.3
-        * cylinders.crank**2
-        * cylinders.geometry(cylinders.max_lever_angle).stiffness
-        / robot.torque_limits
-    )
+        phase, ramp = 4.0 * np.pi * i * dt, min(1.0, i / 100.0)  # set off gently
+        q = best + ramp * 0.3 * np.sin(phase)
+        v = np.full(12, ramp * 0.3 * 4.0 * np.pi * np.cos(phase))
+        worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / limits)
+    stiffness = actuators.cylinders.geometry(best).stiffness
+    spring = 0.3 * actuators.cylinders.crank**2 * stiffness / limits
     assert np.max(worst) < 0.06
     assert np.min(spring / worst) > 100.0
 
@@ -343,26 +336,19 @@ def test_at_the_standing_angles_the_supply_gives_each_joint_its_torque_limit(nam
 @pytest.mark.parametrize("turn", [-1.0, -0.5, 0.0, 0.5, 1.0])
 def test_the_supply_pressure_limits_the_torque(turn):
     actuators = joints(replace(HYQ, leakage=0.0))
-    q, still = actuators.cylinders.max_lever_angle + turn, np.zeros(12)
-    high, low = HYQ.supply_pressure, HYQ.tank_pressure
-    A, B = actuators.cylinders.areas
-    limits = actuators.cylinders.geometry(q).lever * np.array(
-        [A * low - B * high, A * high - B * low]
-    )
-    for sign, limit in zip((-1.0, 1.0), limits, strict=True):
-        out = np.array(
-            [actuators.step(sign * 5.0 * np.abs(limits[1]), q, still, 1e-3) for _ in range(300)]
-        )
+    cylinders, high, low = actuators.cylinders, HYQ.supply_pressure, HYQ.tank_pressure
+    A, B = cylinders.areas
+    lever = cylinders.geometry(cylinders.max_lever_angle + turn).lever
+    push = lever * (A * high - B * low)
+    for sign, limit in ((-1.0, lever * (A * low - B * high)), (1.0, push)):
+        out = run(actuators, sign * 5.0 * np.abs(push), 0.3, turn=turn)
         assert np.allclose(out[-1], limit, rtol=2e-3)
         assert np.all(sign * out <= sign * limit * (1.0 + 1e-9))
 
 
 def test_where_crank_and_cylinder_line_up_there_is_no_torque():
-    actuators = joints()
-    q = actuators.cylinders.max_lever_angle - np.arccos(HYQ.crank / HYQ.base)
-    out = np.array(
-        [actuators.step(judges.load("go2").torque_limits, q, np.zeros(12), 1e-3) for _ in range(50)]
-    )
+    turn = -np.arccos(HYQ.crank / HYQ.base)
+    out = run(joints(), judges.load("go2").torque_limits, 0.05, turn=turn)
     assert np.all(np.isfinite(out))
     assert np.max(np.abs(out)) < 1e-6
 
@@ -396,7 +382,7 @@ def test_a_reset_puts_the_oil_under_the_desired_torques_and_forgets_the_rest():
     actuators.reset(tau, q)
     assert np.allclose(actuators.torques(q), tau)
     assert not np.any(actuators.state.opening) and not np.any(actuators.state.integral)
-    held = np.array([actuators.step(tau, q, np.zeros(12), 1e-3) for _ in range(100)])
+    held = run(actuators, tau, 0.1, turn=0.3)
     assert np.max(np.abs(held - tau) / robot.torque_limits) < 0.01
     actuators.reset()
     assert np.allclose(actuators.torques(actuators.cylinders.max_lever_angle), 0.0, atol=1e-9)

@@ -65,11 +65,8 @@ def test_a_delay_stays_as_long_as_it_was_after_ten_thousand_steps():
 def test_a_lags_step_response_is_its_closed_form(bandwidth):
     times = 1e-3 * np.arange(1, 301)
     closed = 12.0 * (1.0 - np.exp(-2.0 * np.pi * bandwidth * times))
-    assert np.allclose(
-        got(FirstOrderLag(ROBOT, bandwidth), np.full((300, 12), 12.0)).T,
-        closed,
-        atol=12.0 * ROUNDING,
-    )
+    answer = got(FirstOrderLag(ROBOT, bandwidth), np.full((300, 12), 12.0))
+    assert np.allclose(answer.T, closed, atol=12.0 * ROUNDING)
 
 
 def test_a_lag_takes_three_decibels_and_45_degrees_off_a_sine_of_its_bandwidth():
@@ -142,10 +139,6 @@ def test_go2_stands_live_through_a_lag():
 
 
 def test_actuators_of_another_robot_are_refused():
+    sim, late = fb.Simulation(ROBOT), Delay(judges.load("solo12"), 0.0)
     with raises(InputError, "actuators", "solo12", "go2"):
-        fb.rollout(
-            fb.Simulation(ROBOT),
-            judges.controller_of("go2"),
-            0.01,
-            actuators=Delay(judges.load("solo12"), 0.0),
-        )
+        fb.rollout(sim, judges.controller_of("go2"), 0.01, actuators=late)

@@ -84,22 +84,21 @@ def test_a_user_defined_adjustment_decides_where_feet_land():
         assert com.shape == com_velocity.shape == (3,) and path.time == t
         return {foot: each.planned_end[:2] for foot, each in plan.planned_swings.items()}
 
-    walk = trot(adjustment=none)
+    walk, default = trot(adjustment=none), trot()
     push = fb.Push([0.0, 60.0, 0.0], start=0.45, duration=0.02)
-    record = run(walk, 1.0, push)
-    assert record.outcome == "completed" and asked == {foot.frame for foot in walk.robot.feet}
-    default = trot()
-    run(default, 1.0, push)
-    for each in list(walk.history)[1:]:
-        for foot, swing in each.planned_swings.items():
-            assert np.allclose(each.footholds[foot][:2], swing.planned_end[:2], atol=0.03)
-    moved = [
-        np.abs(b.feet[foot][1] - a.planned_swings[foot].planned_end[1])
-        for plans in (walk.history, default.history)
-        for a, b in [list(plans)[2:4]]
-        for foot in a.planned_swings
-    ]
-    assert max(moved[:2]) < 0.01 < min(moved[2:])  # m
+    for each in (walk, default):
+        assert run(each, 1.0, push).outcome == "completed"
+    assert asked == {foot.frame for foot in walk.robot.feet}
+    for step in list(walk.history)[1:]:
+        for foot, swing in step.planned_swings.items():
+            assert np.allclose(step.footholds[foot][:2], swing.planned_end[:2], atol=0.03)
+
+    def moved(walk: Walk) -> list[float]:
+        before, after = list(walk.history)[2:4]
+        planned = before.planned_swings.items()
+        return [abs(after.feet[foot][1] - swing.planned_end[1]) for foot, swing in planned]
+
+    assert max(moved(walk)) < 0.01 < min(moved(default))  # m
 
 
 def test_a_plan_may_be_replaced_and_made_more_often():
@@ -178,29 +177,16 @@ def test_the_commanded_motion_approaches_its_goal_at_the_largest_acceleration():
     assert np.allclose(walk.path_at(2.0).velocity, [0.4, 0.0, 0.3])
 
 
-class KnownPlane:
-    """A plane through the origin, as a ground that a walk knows."""
-
-    def __init__(self, normal: np.ndarray):
-        self._normal = normal
-
-    def height(self, xy: np.ndarray) -> float:
-        return float(-self._normal[:2] @ xy / self._normal[2])
-
-    def normal(self, xy: np.ndarray) -> np.ndarray:
-        return self._normal
-
-
 def test_soles_follow_a_ground_that_is_known():
     """With level soles, talos slid 20 mm in each stance on a slope of 5°."""
     robot, angle = judges.load("talos"), np.deg2rad(5.0)
-    normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
-    contacts, slides = fb.Contacts.feet(robot, mu=0.6, normals=normal), {}
-    for ground in (None, KnownPlane(normal)):
-        walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=ground)
-        record = run(walk, 3.2, ground=fb.Ground(normal=normal))
+    slope = fb.Ground(normal=[-np.sin(angle), 0.0, np.cos(angle)])
+    contacts, slides = fb.Contacts.feet(robot, mu=0.6, normals=slope.normals[0]), {}
+    for known in (None, slope):
+        walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=known)
+        record = run(walk, 3.2, ground=slope)
         assert record.outcome == "completed"
-        slides[ground is None] = record.slip(include_rolling=False).max()
+        slides[known is None] = record.slip(include_rolling=False).max()
     assert slides[False] < 2e-3 < 5e-3 < slides[True]  # m
 
 

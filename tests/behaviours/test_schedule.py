@@ -35,11 +35,8 @@ QUADRUPED = {
 def test_a_trot_lifts_diagonal_feet_together(name):
     first, with_it, second, with_that = QUADRUPED[name]
     gait = Gait.trot(judges.load(name), swing=0.25, start=1.0)
-    in_the_air = (
-        {foot[:2] for foot in gait.feet if gait.swing_at(foot, 1.1)},
-        {foot[:2] for foot in gait.feet if gait.swing_at(foot, 1.3)},
-    )
-    assert in_the_air == ({first, with_it}, {second, with_that})
+    for t, expected in ((1.1, {first, with_it}), (1.3, {second, with_that})):
+        assert {foot[:2] for foot in gait.feet if gait.swing_at(foot, t)} == expected
     assert len(gait.stance(0.99)) == 4 and gait.stance(1.0) == gait.stance(1.2)
 
 
@@ -77,15 +74,9 @@ def test_no_foot_lifts_from_the_stop_on_and_endless_standing_is_cut():
 
 def test_stances_do_not_depend_on_the_rounding_of_the_clock():
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
-    timestep, stances = 1e-3, []
-    t = 0.0
-    for _ in range(20_000):  # 20 s, added up as in a simulation
-        stances.append(gait.stance(t))
-        t += timestep
-    changes = [
-        i for i, (before, after) in enumerate(itertools.pairwise(stances), 1) if before != after
-    ]
-    assert changes == list(range(250, 20_000, 250))
+    times = np.cumsum(np.full(20_000, 1e-3)) - 1e-3  # 20 s, added up as in a simulation
+    pairs = enumerate(itertools.pairwise(gait.stance(t) for t in times), 1)
+    assert [i for i, (before, after) in pairs if before != after] == list(range(250, 20_000, 250))
 
 
 def test_gaits_refuse_what_does_not_fit():
@@ -209,38 +200,29 @@ def test_a_gait_that_is_taken_late_keeps_its_lift_offs_and_leaves_out_what_is_ov
     rng = np.random.default_rng(4)
     for _ in range(20):
         period, start = rng.uniform(0.2, 2.0), rng.uniform(-1.0, 1.0)
-        gait = Gait(
-            {foot: rng.uniform(0.0, 0.99) for foot in "abcd"},
-            period,
-            rng.uniform(0.05, 0.9) * period,
-            start,
-            stop=9.0,
-        )
+        offsets, swing = {foot: rng.uniform(0.0, 0.99) for foot in "abcd"}, rng.uniform(0.05, 0.9)
+        gait = Gait(offsets, period, swing * period, start, stop=9.0)
         late = start + rng.uniform(0.0, 5.0)
         after = gait.starting_at(late)
         assert gait.starting_at(start) is gait
         assert not any(after.swing_at(foot, late - 1e-6) for foot in "abcd")
-        for t in rng.uniform(late, 12.0, 20):
-            for foot in "abcd":
-                times, found = gait.swing_at(foot, t), after.swing_at(foot, t)
-                if times is None or times[0] < late:
-                    assert found is None
-                else:
-                    assert found is not None and np.allclose(times, found, atol=1e-9)
+        for t, foot in itertools.product(rng.uniform(late, 12.0, 20), "abcd"):
+            times, found = gait.swing_at(foot, t), after.swing_at(foot, t)
+            if times is None or times[0] < late:
+                assert found is None
+            else:
+                assert found is not None and np.allclose(times, found, atol=1e-9)
     gait = Gait({"a": 0.0, "b": 0.5}, 0.5, 0.25)
     # 30 · 0.1 is not 3 but more, due to rounding
     assert gait.starting_at(30 * 0.1).swing_at("a", 3.0) == pytest.approx((3.0, 3.25))
 
 
 def test_a_swing_of_no_duration_is_refused():
+    swing = Swing(np.zeros(3), np.ones(3), 0.0, 1e-3)
+    assert np.all(np.isfinite(swing(5e-4)[2]))
     for touchdown in (0.0, 1e-200, 1e-160, 5e-4):
-        refused(
-            lambda touchdown=touchdown: Swing(np.zeros(3), np.ones(3), 0.0, touchdown),
-            InputError,
-            "touchdown",
-            0.001,
-        )
-    assert np.all(np.isfinite(Swing(np.zeros(3), np.ones(3), 0.0, 1e-3)(5e-4)[2]))
+        with raises(InputError, "touchdown", 0.001):
+            replace(swing, touchdown=touchdown)
 
 
 def test_pitch_and_yaw_take_any_sequence_of_two_angles():

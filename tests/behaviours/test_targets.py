@@ -7,7 +7,8 @@ with pushes, turns, changes of stance, known slopes, and a body that is lowered 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import judges
 import numpy as np
@@ -20,27 +21,11 @@ from floatbase.control import Command
 ROBOTS = {"go2": Gait.trot, "hyq": Gait.crawl, "talos": Gait.walk}
 
 
-class Slope(NamedTuple):
-    """A plane as a ground that a walk knows."""
-
-    gradient: np.ndarray
-    level: float
-
-    def height(self, xy: np.ndarray) -> float:
-        return float(self.gradient @ xy + self.level)
-
-    def normal(self, xy: np.ndarray) -> np.ndarray:
-        normal = np.array([*-self.gradient, 1.0])
-        return normal / np.linalg.norm(normal)
-
-
 def walks(name: str, backends: tuple[str, ...], **options: Any) -> list[Walk]:
     robot = judges.load(name)
     gait, contacts = ROBOTS[name](robot, start=0.05), fb.Contacts.feet(robot, mu=0.6)
-    return [
-        Walk(robot, contacts, gait, (0.2, 0.05), 0.3, backend=backend, **options)
-        for backend in backends
-    ]
+    make = partial(Walk, robot, contacts, gait, (0.2, 0.05), 0.3, **options)
+    return [make(backend=backend) for backend in backends]
 
 
 def random_steps(
@@ -59,7 +44,8 @@ def random_steps(
 @pytest.mark.parametrize("name", ROBOTS)
 def test_one_compiled_function_writes_what_the_definitions_say(name, known_ground):
     rng = np.random.default_rng(2)
-    ground = Slope(rng.normal(0.0, 0.15, 2), 0.01) if known_ground else None
+    gradient = rng.normal(0.0, 0.15, 2)
+    ground = fb.Ground(normal=[*-gradient, 1.0], offset=0.01) if known_ground else None
     fast, slow = walks(name, ("compiled", "reference"), ground=ground, pitch=0.05)
     swinging = 0
     for i, (q, v, t) in enumerate(random_steps(name, 40, rng)):
@@ -87,7 +73,7 @@ def angular_velocity(before: np.ndarray, R: np.ndarray, after: np.ndarray, dt: f
 @pytest.mark.parametrize("name", ["go2", "talos"])
 def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name):
     """By central differences, on a slope, while the robot turns."""
-    (walk,) = walks(name, ("compiled",), ground=Slope(np.array([0.1, -0.05]), 0.0))
+    (walk,) = walks(name, ("compiled",), ground=fb.Ground(normal=[-0.1, 0.05, 1.0]))
     state, step, t = judges.load(name).standing(), 1e-5, 0.0
     while t < 0.15:
         walk(state.q, state.v, t)

@@ -91,10 +91,8 @@ def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_fre
 @pytest.mark.parametrize(
     ("name", "feet"),
     [
-        (
-            "hyq",
-            ["lf_foot", "lh_foot", "rf_foot", "rh_foot"],
-        ),  # feet with mass and no inertia, the last links of their legs
+        # feet with mass and no inertia, the last links of their legs
+        ("hyq", ["lf_foot", "lh_foot", "rf_foot", "rh_foot"]),
         ("anymal_c", ["LF_FOOT"]),  # cameras whose inertia no body has
         ("bolt", ["FL_FOOT"]),  # feet with inertia and no mass
     ],
@@ -140,10 +138,9 @@ def test_an_impossible_inertia_with_turned_axes_is_handed_on_as_it_stands(tmp_pa
 
 
 def test_moving_links_with_an_impossible_inertia_are_named_with_the_joints_to_hold():
+    feet = ["l_sole", "r_sole"]
     with raises(SimulationError, "r_hip_1", "icub_reduced", 0) as caught:
-        fb.Simulation(fb.load("icub_reduced", feet=["l_sole", "r_sole"]))
+        fb.Simulation(fb.load("icub_reduced", feet=feet))
     found = re.search(r"locked=(\[.*?\])", str(caught.value))
     assert found
-    fb.Simulation(
-        fb.load("icub_reduced", feet=["l_sole", "r_sole"], locked=ast.literal_eval(found[1]))
-    )
+    fb.Simulation(fb.load("icub_reduced", feet=feet, locked=ast.literal_eval(found[1])))

@@ -17,7 +17,7 @@ from waiting import until
 import floatbase as fb
 from floatbase.errors import SimulationError
 from floatbase.simulation import LiveSimulation
-from floatbase.viewer import PUSH_DISPLAY_TIME, status_message
+from floatbase.viewer import PUSH_DISPLAY_TIME
 from floatbase.viewer.export.recording import push_at
 
 ROBOT = judges.load("go2")
@@ -75,22 +75,6 @@ def test_an_error_in_a_controller_is_reported_and_the_run_can_go_on_with_another
     until(lambda: len(slices) > 1)
 
 
-@pytest.mark.parametrize(
-    ("status", "reason", "line"),
-    [
-        ("paused", "", "paused"),
-        ("idle", "", "paused"),
-        ("fell", "", "fell"),
-        ("controller failed", "no point satisfies all constraints. In conflict:\n  6 × friction.",
-            "controller failed: no point satisfies all constraints"),
-        ("stopped", "0.5 s is odd.\nWhy?", "stopped: 0.5 s is odd"),
-    ],
-)  # fmt: skip
-def test_the_status_message_is_one_sentence(status, reason, line):
-    message = status_message(status, reason)
-    assert message.startswith(line) and not {"\n", "Why", "6"} & {*message, *message.split()}
-
-
 class Held:
     """A `show` that holds the run in the middle of a slice after `hold`, for certain timing."""
 
@@ -126,30 +110,22 @@ def held_run(held: Held) -> Iterator[LiveSimulation]:
     live.close()
 
 
-def test_pushes_before_a_reset_are_forgotten(held_run, held):
+@pytest.mark.parametrize("after", [[], [(0.0, 30.0)]])
+def test_a_reset_forgets_the_pushes_before_it_and_none_after_it(held_run, held, after):
     held.hold()
     held_run.start()
     assert held.inside.wait(15.0)
     for _ in range(5):
         held_run.push([0.0, 200.0, 0.0])
     held_run.reset()
+    for _, force in after:
+        held_run.push([0.0, force, 0.0])
     count = len(held.slices)
     held.go_on.set()
     until(lambda: len(held.slices) > count + 3)
-    assert held.slices[count].time[0] == 0.0
-    assert all(not s.pushes for s in held.slices[count:])
-
-
-def test_a_push_after_a_reset_that_is_still_to_come_acts(held_run, held):
-    held.hold()
-    held_run.start()
-    assert held.inside.wait(15.0)
-    held_run.reset()
-    held_run.push([0.0, 30.0, 0.0])
-    count = len(held.slices)
-    held.go_on.set()
-    until(lambda: len(held.slices) > count)
-    assert [(p.start, p.force[1]) for p in held.slices[count].pushes] == [(0.0, 30.0)]
+    first = held.slices[count]
+    assert first.time[0] == 0.0
+    assert [(push.start, push.force[1]) for push in first.pushes] == after
 
 
 HARD = ([0.0, 0.0, -1200.0], 0.3)  # N, s: a downward push that no controller withstands
@@ -284,27 +260,22 @@ def test_actuators_stand_between_and_begin_anew_with_the_robot(slices):
     class Delay:
         """Actuators that give the torques desired one step earlier."""
 
-        def __init__(self) -> None:
-            self.reset()
+        resets = steps = 0
+        last = controller()(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
 
         def reset(self) -> None:
-            self.last = controller()(ROBOT.standing().q, np.zeros(ROBOT.nv)).tau
-            self.steps, self.resets = 0, getattr(self, "resets", -1) + 1
+            self.resets += 1
 
-        def step(
-            self, tau_desired: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float
-        ) -> np.ndarray:
-            self.last, now = tau_desired, self.last
+        def step(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+            self.last, now = tau, self.last
             self.steps += 1
             return now
 
-    delay = Delay()
-    run = LiveSimulation(
-        fb.Simulation(ROBOT), controller(), slices.append, actuators=delay, after_reset=delay.reset
-    )
+    delay, sim = Delay(), fb.Simulation(ROBOT)
+    options = {"actuators": delay, "after_reset": delay.reset}
+    run = LiveSimulation(sim, controller(), slices.append, **options)
     run.start()
     until(lambda: len(slices) > 3)
-    run.pause()
     run.close()
     assert delay.steps == sum(len(s) for s in slices) * 2  # steps of the physics, two for each tick
     desired = 0.5 * (slices[0].tau_desired[-1] + slices[1].tau_desired[0])

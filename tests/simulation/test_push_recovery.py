@@ -54,24 +54,20 @@ def test_the_push_recovery_map_separates_survival_from_falls_and_is_symmetric(re
 def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(recovery):
     state, robot = recovery.state, recovery.state.robot
     feet, com = recovery.contacts.positions(state), state.com
-    height, hull = com[2] - feet[:, 2].mean(), ConvexHull(feet[:, :2])
-    omega = np.sqrt(robot.gravity / height)
+    ground, hull = feet[:, 2].mean(), ConvexHull(feet[:, :2])
+    height, normals, offsets = com[2] - ground, hull.equations[:, :2], hull.equations[:, 2]
+    omega, directions = np.sqrt(robot.gravity / height), recovery.unit_vectors[:, :2]
     # an impulse moves the capture point to the edge; a constant push tips the robot over the edge
     for duration, farther in ((1e-6, 1e-6 / (robot.mass * omega)), (1e2, height / robot.weight)):
-        moved = (
-            com[:2]
-            + (replace(recovery, duration=duration).capture_point_bound * farther)[:, None]
-            * recovery.unit_vectors[:, :2]
-        )
-        beyond = moved @ hull.equations[:, :2].T + hull.equations[:, 2]
-        assert np.allclose(beyond.max(axis=1), 0.0, atol=1e-5)  # m
+        shift = replace(recovery, duration=duration).capture_point_bound * farther
+        moved = com[:2] + shift[:, None] * directions
+        assert np.allclose((moved @ normals.T + offsets).max(axis=1), 0.0, atol=1e-5)  # m
     # in between: a pendulum with its centre of pressure at the edge, at distance s, has its capture
     # point there at the end of the push
     border = replace(recovery, duration=1e2).capture_point_bound * height / robot.weight
-    transition = expm(
-        recovery.duration * np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]])
-    )
-    x = transition[:, 2:] * (recovery.capture_point_bound / robot.mass - omega**2 * border)
+    rates = np.array([[0.0, 1.0, 0.0], [omega**2, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    excess = recovery.capture_point_bound / robot.mass - omega**2 * border
+    x = expm(recovery.duration * rates)[:, 2:] * excess
     assert np.allclose(x[0] + x[1] / omega, border, rtol=1e-9)
     # one foot alone cannot support the robot; two front feet can only with a push of the right size
     for few in (recovery.contacts.only("FL_foot"), recovery.contacts.only("FL_foot", "FR_foot")):
@@ -80,13 +76,11 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
 
     # (20), (21): a constant push F at height z tips the robot over an edge at a distance l if F z >
     # m g l and it does not slide
-    slack = -(com[:2] @ hull.equations[:, :2].T + hull.equations[:, 2])
-    base = state.frame_pose("base").translation
-    lever = (base[2] - feet[:, 2].mean()) * recovery.unit_vectors[:, :2] @ hull.equations[:, :2].T
-    tips = np.min(
-        np.where(lever > 0.0, robot.weight * slack / np.where(lever > 0.0, lever, 1.0), np.inf),
-        axis=1,
-    )
+    slack = -(com[:2] @ normals.T + offsets)
+    lever = (state.frame_pose("base").translation[2] - ground) * directions @ normals.T
+    forces = np.full(lever.shape, np.inf)
+    np.divide(robot.weight * slack, lever, out=forces, where=lever > 0.0)
+    tips = forces.min(axis=1)
     assert np.all(tips < 0.7 * np.cos(np.pi / 16) * robot.weight)
     # the feet are level to a fraction of a millimetre
     assert np.allclose(recovery.static_bound, tips, rtol=1e-3)
@@ -94,45 +88,22 @@ def test_theory_agrees_with_the_hull_of_the_feet_and_with_the_torque_that_tips(r
 
 
 def test_the_push_recovery_map_is_plotted_and_drawn_to_scale(recovery):
-    axis = push_recovery_plots.plot(recovery)
-    measured = axis.get_lines()[0]
-    assert np.allclose(measured.get_ydata(), [*recovery.pushes, recovery.pushes[0]])
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "largest push survived", "capture-point bound (theory)", "static bound (theory)",
-    ]  # fmt: skip
-    plt.close(axis.figure)
+    before = replace(recovery, pushes=recovery.pushes / 2)
+    axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
+    for line, shown in zip(axis.get_lines(), (recovery, before), strict=True):
+        assert np.allclose(line.get_ydata(), [*shown.pushes, shown.pushes[0]])
     with raises(InputError, "polar"):
         push_recovery_plots.plot(recovery, plt.figure().add_subplot())
     plt.close("all")
+    other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
+    refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
     near, far = (push_recovery_plots.picture(recovery, scale) for scale in (0.001, 0.002))
     expected = {"push_recovery", "capture_point_bound", "static_bound"}
     assert {path.split("/")[0] for path in near} == expected
-    assert {path.split("/")[0] for path in push_recovery_plots.picture(recovery, theory=False)} == {
-        "push_recovery"
-    }
-    assert near.keys() == far.keys() and "push_recovery/ring 100 N" in near
-    assert all(
-        np.allclose(near[path].matrix[:2, 3], recovery.state.q[:2])
-        for path in near
-        if "label" not in path
-    )
-    before = replace(recovery, pushes=recovery.pushes / 2)
-    axis = push_recovery_plots.plot(recovery, theory=False, previous=before)
-    grey = axis.get_lines()[1]
-    assert np.allclose(grey.get_ydata()[:-1], recovery.pushes / 2)
-    assert grey.get_label() == "largest push survived, previous run"
-    plt.close(axis.figure)
-    assert {
-        path.split("/")[0]
-        for path in push_recovery_plots.picture(recovery, theory=False, previous=before)
-    } == {"push_recovery", "previous"}
-    other = replace(recovery, directions=recovery.directions[:-1], pushes=recovery.pushes[:-1])
-    refused(lambda: push_recovery_plots.plot(recovery, previous=other), InputError, 6, 5)
-    ends = [
-        picture["push_recovery/label 100 N"].matrix[:2, 3] - recovery.state.q[:2]
-        for picture in (near, far)
-    ]
-    assert np.allclose(np.linalg.norm(ends, axis=1), [0.1, 0.2])
+    for drawn, radius in ((near, 0.1), (far, 0.2)):
+        label, ring = (drawn[f"push_recovery/{kind} 100 N"].matrix for kind in ("label", "ring"))
+        assert np.allclose(ring[:2, 3], recovery.state.q[:2])
+        assert np.linalg.norm(label[:2, 3] - ring[:2, 3]) == pytest.approx(radius)
 
 
 def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
@@ -151,15 +122,11 @@ def test_push_recovery_refuses_invalid_arguments_and_factories(standing):
 
 @pytest.mark.front_end
 def test_push_recovery_needs_a_robot_that_stands_without_a_push(standing):
-    robot = standing.robot
-
     def fails(q: np.ndarray, v: np.ndarray, t: float) -> Any:
         raise InfeasibleError("no torque")
 
-    vars(fails)["robot"] = robot
-    for make, reason in (
-        (lambda: fails, "no torque"),
-        (lambda: (fb.Simulation(robot), judges.limp), 0),
-    ):
+    vars(fails)["robot"] = standing.robot
+    limp = (fb.Simulation(standing.robot), judges.limp)
+    for make, reason in ((lambda: fails, "no torque"), (lambda: limp, 0)):
         with raises(SimulationError, reason):
             fb.push_recovery(make, directions=3, workers=1, **QUICK)

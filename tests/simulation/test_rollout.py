@@ -87,25 +87,19 @@ def test_a_controller_without_an_answer_ends_the_record_and_its_error_is_kept(si
 
 
 def test_a_controller_that_fails_at_once_leaves_an_empty_record(sim):
-    robot = sim.robot
-    contacts = fb.Contacts.points(robot)
-    greedy = fb.WholeBodyController(
-        robot, contacts, fb.standing_tasks(robot.standing()), min_normal_force=5000.0
-    )
+    state, contacts = sim.robot.standing(), fb.Contacts.points(sim.robot)
+    tasks = fb.standing_tasks(state)
+    greedy = fb.WholeBodyController(sim.robot, contacts, tasks, min_normal_force=5000.0)
     record = fb.rollout(sim, greedy, 0.1)
     assert (record.outcome, len(record)) == ("controller failed", 0)
-    expected = ((0, robot.nq), (0, 12), (0, 3))
-    assert (record.q.shape, record.measured.shape, record.com.shape) == expected
+    assert record.q.shape == (0, sim.robot.nq) and record.com.shape == (0, 3)
     assert "controller failed" in repr(record)
     for look in (record.slip, lambda: record.final):
         refused(look, InputError, "controller failed")
     fb.rollout(sim, judges.controller_of("go2"), 0.01)  # feet have touched the ground
     record = fb.rollout(sim, greedy, 0.1)
-    assert (record.outcome, record.measured.shape, record.foot_positions.shape) == (
-        "controller failed",
-        (0, 12),
-        (0, 4, 3),
-    )
+    assert record.outcome == "controller failed"
+    assert record.measured.shape == (0, 12) and record.foot_positions.shape == (0, 4, 3)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, None, "much"])
@@ -127,25 +121,15 @@ def test_torques_that_are_no_finite_numbers_end_the_record_and_rows_before_are_k
     assert np.all(np.isfinite(record.tau))
 
 
-def test_actuators_with_nan_torques_end_the_record_too(sim):
+def test_actuators_with_nan_torques_end_the_record_and_cannot_write_into_those_desired(sim):
     class Broken:
         def step(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
-            return tau / 0.0 if sim.time > 0.0095 else tau
+            assert not tau.flags.writeable
+            return tau * np.nan if sim.time > 0.0095 else tau
 
-    with np.errstate(all="ignore"):
-        record = fb.rollout(sim, judges.controller_of("go2"), 0.1, actuators=Broken())
+    record = fb.rollout(sim, judges.controller_of("go2"), 0.1, actuators=Broken())
     assert (record.outcome, len(record)) == ("controller failed", 10)
     assert "actuators" in str(record.error)
-
-
-def test_actuators_cannot_write_into_the_torques_of_the_controller(sim):
-    class Careless:
-        def step(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
-            tau[:] = 0.0
-            return tau
-
-    with pytest.raises(ValueError):
-        fb.rollout(sim, limp, 0.01, actuators=Careless())
 
 
 def test_mistakes_in_a_controller_are_not_swallowed(sim):
@@ -165,13 +149,10 @@ def test_the_record_holds_a_row_for_each_tick_taken_before_its_torques_act(sim):
         return inner(q, v, t)
 
     record = fb.rollout(sim, watched, 0.02)
-    assert len(record) == len(seen) == 20
-    assert np.allclose(record.time, 1e-3 * np.arange(20))
+    q, v, t = (np.array(rows) for rows in zip(*seen, strict=True))
+    assert np.array_equal(record.q, q) and np.array_equal(record.v, v)
+    assert np.allclose(record.time, t) and np.allclose(t, 1e-3 * np.arange(20))
     assert np.allclose(record.q[0], start.q)
-    for i, (q, v, t) in enumerate(seen):
-        assert np.array_equal(record.q[i], q)
-        assert np.array_equal(record.v[i], v)
-        assert record.time[i] == pytest.approx(t)
     assert np.array_equal(record.state(3).q, record.q[3])
     assert np.array_equal(record.final.q, record.q[-1])
     assert np.allclose(record.com, [record.state(i).com for i in range(20)])
@@ -242,9 +223,7 @@ def test_forces_of_feet_that_the_controller_does_not_use_are_left_out():
 
 
 def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners():
-    robot = judges.load("talos")
-    start = robot.standing()
-    flat = fb.WholeBodyController(robot, fb.Contacts.flat_feet(robot), fb.standing_tasks(start))
+    robot, flat = judges.load("talos"), judges.controller_of("talos")
 
     class Points:
         """The flat-footed controller, with two point contacts as its stance."""
@@ -254,39 +233,33 @@ def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners():
         def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> Torques:
             return Torques(flat(q, v, t).tau)
 
-    corners = fb.rollout(fb.Simulation(robot), flat, 0.03)
-    points = fb.rollout(fb.Simulation(robot), Points(), 0.03)
-    expected = corners.measured.reshape(30, 2, 4, 3).sum(axis=2)
-    assert np.allclose(points.measured.reshape(30, 2, 3), expected, atol=1e-6)
-    assert np.allclose(
-        points.foot_positions, corners.foot_positions.reshape(30, 2, 4, 3).mean(axis=2), atol=1e-9
+    corners, points = (fb.rollout(fb.Simulation(robot), by, 0.03) for by in (flat, Points()))
+    forces, places = (
+        rows.reshape(30, 2, 4, 3) for rows in (corners.measured, corners.foot_positions)
     )
+    assert np.allclose(points.measured.reshape(30, 2, 3), forces.sum(axis=2), atol=1e-6)
+    assert np.allclose(points.foot_positions, places.mean(axis=2), atol=1e-9)
 
 
 def test_an_arm_bolted_to_the_ground_never_falls():
-    record = fb.rollout(
-        fb.Simulation(judges.load("ur5")), lambda q, v, t: Torques(np.zeros(6)), 0.3
-    )
+    sim = fb.Simulation(judges.load("ur5"))
+    record = fb.rollout(sim, lambda q, v, t: Torques(np.zeros(6)), 0.3)
     assert record.outcome == "completed"
     assert np.linalg.norm(record.final.q - record.q[0]) > 0.1, "it did not move"
 
 
 def test_an_arm_under_the_controller_reaches_its_posture():
     robot = judges.load("ur5")
-    sim = fb.Simulation(robot)
     target = robot.standing().q + 0.2
-    controller = fb.WholeBodyController(
-        robot, fb.Contacts.none(), [fb.PostureTask(target, weight=1e3)]
-    )
-    record = fb.rollout(sim, controller, 1.0)
+    task = fb.PostureTask(target, weight=1e3)
+    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [task])
+    record = fb.rollout(fb.Simulation(robot), controller, 1.0)
     assert record.outcome == "completed"
     assert record.planned.shape == record.measured.shape == (1000, 0)
     assert np.allclose(record.final.q, target, atol=5e-3)
 
 
-def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics_nor_the_record(
-    sim,
-):
+def test_a_controller_that_writes_into_its_arguments_changes_nothing(sim):
     def careless(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
         q[:], v[:] = 0.0, 1.0
         return Torques(np.zeros(12))
@@ -300,21 +273,16 @@ def test_a_controller_that_writes_into_its_arguments_changes_neither_the_physics
 
 def test_a_record_has_applied_and_desired_torques():
     robot = judges.load("solo12")
-    sim = fb.Simulation(robot)
-
-    class Shout:
-        tau = np.full(12, 100.0)
-
-    record = fb.rollout(sim, lambda q, v, t: Shout(), 0.005)
+    loud = Torques(np.full(12, 100.0))
+    record = fb.rollout(fb.Simulation(robot), lambda q, v, t: loud, 0.005)
     assert np.all(record.tau_desired == 100.0)
     assert np.allclose(record.tau, robot.torque_limits)
 
 
 def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zero():
     robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot", "FL_calf"]) + fb.Contacts(
-        [fixed_frame("base")]
-    )
+    points = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot", "FL_calf"])
+    contacts = points + fb.Contacts([fixed_frame("base")])
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
     record = fb.rollout(fb.Simulation(robot), controller, 0.005)
     assert np.all(np.isnan(record.measured[:, 6:]))
@@ -398,17 +366,14 @@ def test_a_foot_that_joins_the_stance_later_joins_the_record(sim):
 
 
 def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused():
-    robot = judges.load("talos")
-    flat, point = (
-        make(robot, frames=["left_sole_link"])
-        for make in (fb.Contacts.flat_feet, fb.Contacts.points)
-    )
+    robot, frames = judges.load("talos"), ["left_sole_link"]
 
     class Shifty:
-        contacts = flat
+        contacts = fb.Contacts.flat_feet(robot, frames=frames)
 
         def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> Torques:
-            self.contacts = flat if t < 0.001 else point
+            if t >= 0.001:
+                self.contacts = fb.Contacts.points(robot, frames=frames)
             return Torques(np.zeros(robot.d))
 
     with raises(InputError, "left_sole_link", 12, 3):
@@ -416,14 +381,12 @@ def test_a_contact_that_changes_its_kind_within_a_rollout_is_refused():
 
 
 def test_the_force_of_a_foot_is_found_by_its_name_and_of_a_flat_foot_is_the_resultant():
-    robot = judges.load("talos")
-    record = fb.rollout(fb.Simulation(robot), judges.controller_of("talos"), 0.02)
+    sim = fb.Simulation(judges.load("talos"))
+    record = fb.rollout(sim, judges.controller_of("talos"), 0.02)
     for kind in ("measured", "planned"):
-        forces = getattr(record, kind)
-        left, right = (record.force(name, kind) for name in ("left_sole_link", "right_sole_link"))
-        assert left.shape == (20, 3)
-        assert np.allclose(left, forces.reshape(20, 8, 3)[:, :4].sum(axis=1))
-        assert np.allclose(left + right, forces.reshape(20, 8, 3).sum(axis=1))
+        forces = getattr(record, kind).reshape(20, 2, 4, 3).sum(axis=2)
+        for i, name in enumerate(("left_sole_link", "right_sole_link")):
+            assert np.allclose(record.force(name, kind), forces[:, i])
     refused(lambda: record.force("left_sole"), UnknownNameError, "left_sole", "left_sole_link")
     with raises(UnknownNameError, "wished", "measured", "planned"):
         record.force("left_sole_link", "wished")

@@ -10,6 +10,8 @@ from browsers import SCREENSHOTS
 from PIL import Image
 from waiting import until
 
+from floatbase.viewer import Item
+
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
 # WebGL contexts of the tests' browser: an ordinary one has 16, which take many displays to use up
@@ -56,3 +58,13 @@ def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
     length = np.linalg.norm(have, axis=2)
     aligned = (have @ expected) / np.maximum(length * np.linalg.norm(expected), 1e-9)
     return int(np.sum((aligned > 0.97) & (length > 25)))
+
+
+def vertices(item: Item) -> np.ndarray:
+    """Return the vertices of an item, (n, 3), in the world frame [m]."""
+    (packed,) = item.shape.data["geometries"]
+    raw = packed["data"]["attributes"]["position"]
+    kind = "<f4" if raw["type"] == "Float32Array" else "<i2"
+    unit = np.frombuffer(raw["array"].data, kind).reshape(-1, 3)
+    size = item.shape.data["object"]["matrix"][0]
+    return size * unit @ item.matrix[:3, :3].T + item.matrix[:3, 3]

@@ -56,17 +56,13 @@ def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
 @needs_chromium
 def test_a_film_lasts_as_long_as_the_recording_in_slow_motion_and_shows_the_push(view, tmp_path):
     av = pytest.importorskip("av", reason="av writes and reads films")
-    path = view.save(tmp_path / "push.mp4", size=SIZE)
-    with av.open(str(path)) as container:
+    with av.open(str(view.save(tmp_path / "push.mp4", size=SIZE))) as container:
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
         rate = float(container.streams.video[0].average_rate)
     assert pictures[0].shape == (SIZE[1], SIZE[0], 3)
     assert abs(len(pictures) / rate - 0.2 / 0.5) < 2.0 / rate
-    assert (
-        share_of_others(pictures[0], pictures[1])
-        < 0.01
-        < share_of_others(pictures[0], pictures[-1])
-    )
+    next_to_it, at_the_end = (share_of_others(pictures[0], pictures[i]) for i in (1, -1))
+    assert next_to_it < 0.01 < at_the_end
 
 
 @needs_chromium
@@ -120,15 +116,13 @@ def test_a_gif_keeps_colours_that_appear_after_its_first_picture(tmp_path):
 @needs_chromium
 def test_names_that_javascript_objects_have_are_drawn(tmp_path):
     robot = fb.load("ur5")
+    images = []
     with closing(fb.Viewer(robot)) as view:
         picture = view.painter.picture(robot.standing())
         view.show(robot.standing())  # places the camera
-        images = []
         for name in ("any", "constructor", "__proto__"):
             view.draw({f"{name}/{path}": item for path, item in picture.items()})
-            images.append(
-                np.array(Image.open(view.save(tmp_path / f"{len(images)}.png", size=SIZE)))
-            )
+            images.append(np.array(Image.open(view.save(tmp_path / f"{name}.png", size=SIZE))))
     assert np.ptp(images[0], axis=(0, 1)).min() > 100  # a robot is in it
     for image in images[1:]:
         assert share_of_others(images[0], image) < 0.01

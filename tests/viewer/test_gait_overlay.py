@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import closing
 
 import numpy as np
 import pytest
-from messages import raises, refused
+from messages import refused
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
-from floatbase.behaviours import Gait, StepPlan, Walk, capture_point
+from floatbase.behaviours import Gait, Walk, capture_point
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
 from floatbase.robots import Robot, State
 from floatbase.simulation import Rollout, Simulation
-from floatbase.viewer import Item, Viewer
+from floatbase.viewer import Viewer
 from floatbase.viewer.export import recording
-from floatbase.viewer.scene.colours import COM, CONE, GREYS, LEGEND, MEASURED, PLANNED, hex_code
+
+from .looks import vertices
+from .test_recording import tracks
 
 ROUNDED = 1e-9  # m: the same place, computed in another order
 POINTS = 1e-4  # of a curve's size: vertices of lines are in single precision
@@ -27,62 +30,38 @@ SWING, START = 0.2, 0.3  # s
 @pytest.fixture(scope="module")
 def walked(go2: Robot) -> tuple[Rollout, Walk]:
     """Return a trot of go2 with four swings; two feet are in the air at the end of the record."""
-    contacts = Contacts.feet(go2, mu=0.6)
-    walk = Walk(go2, contacts, Gait.trot(go2, swing=SWING, start=START), velocity=(0.2, 0.0))
+    gait = Gait.trot(go2, swing=SWING, start=START)
+    walk = Walk(go2, Contacts.feet(go2, mu=0.6), gait, velocity=(0.2, 0.0))
     push = fb.Push([0.0, 40.0, 0.0], start=0.5)
-    return fb.rollout(
-        Simulation(go2), walk, START + 4.5 * SWING, pushes=[push], control_period=2e-3
-    ), walk
+    return fb.rollout(Simulation(go2), walk, START + 4.5 * SWING, [push], 2e-3), walk
 
 
 @pytest.fixture(scope="module")
 def biped() -> tuple[Rollout, Walk]:
     """Return a walk of talos that turns left; one foot is in the air at the end of the record."""
     robot = fb.load("talos")
-    walk = Walk(
-        robot,
-        Contacts.feet(robot, mu=0.6),
-        Gait.walk(robot, start=0.1),
-        velocity=(0.2, 0.0),
-        yaw_rate=0.4,
-    )
+    gait = Gait.walk(robot, start=0.1)
+    walk = Walk(robot, Contacts.feet(robot, mu=0.6), gait, (0.2, 0.0), yaw_rate=0.4)
     return fb.rollout(Simulation(robot), walk, 0.4, control_period=4e-3), walk
-
-
-def vertices(item: Item) -> np.ndarray:
-    """Return the vertices of an item, (n, 3), in the world frame [m]."""
-    (packed,) = item.shape.data["geometries"]
-    raw = packed["data"]["attributes"]["position"]
-    unit = np.frombuffer(
-        raw["array"].data, "<f4" if raw["type"] == "Float32Array" else "<i2"
-    ).reshape(-1, 3)
-    return (
-        unit * item.shape.data["object"]["matrix"][0] @ item.matrix[:3, :3].T + item.matrix[:3, 3]
-    )
 
 
 def test_marks_are_where_the_walk_plans(viewer, walked):
     run, walk = walked
     state, look = run.final, viewer.walk_overlay(walk, run.final)
+    radius = run.robot.feet[0].radius
     assert walk.plan is not None and walk.time == run.time[-1]
     swinging = set(walk.contacts.names) ^ set(run.contacts.names)
     assert len(swinging) == 2
-    assert set(look) == {"dcm", "zmp"} | {f"foothold/{f}" for f in walk.footholds} | {
-        f"swing/{f}" for f in swinging
-    }
+    marks = {f"foothold/{foot}" for foot in walk.footholds} | {f"swing/{foot}" for foot in swinging}
+    assert set(look) == {"dcm", "zmp"} | marks
     expected = capture_point(state.com, state.com_velocity, walk.omega)
     assert_allclose(look["dcm"].matrix[:2, 3], expected, atol=ROUNDED)
     assert_allclose(look["zmp"].matrix[:2, 3], walk.plan.zmp(walk.time), atol=ROUNDED)
     for foot, place in walk.footholds.items():  # go2's frames are in the middles of its balls
         ring = look[f"foothold/{foot}"]
         assert_allclose(ring.matrix[:2, 3], place[:2], atol=ROUNDED)
-        assert (
-            0.0
-            < ring.matrix[2, 3] - (place[2] - run.robot.feet[0].radius)
-            < 0.01 * viewer.painter.size
-        )
-        # seen around the foot
-        assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * run.robot.feet[0].radius
+        assert 0.0 < ring.matrix[2, 3] - (place[2] - radius) < 0.01 * viewer.painter.size
+        assert np.linalg.norm(ring.matrix[:3, 0]) > 1.5 * radius  # seen around the foot
 
 
 def test_a_line_follows_the_swing_to_its_foothold(viewer, walked):
@@ -104,36 +83,24 @@ def test_a_line_follows_the_swing_to_its_foothold(viewer, walked):
 def test_a_swing_with_a_new_target_costs_no_new_shape(viewer, walked):
     run, walk = walked
     viewer.show(run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final))
-    shapes = {path: item.shape for path, item in viewer.renderer.picture.items()}
+    before = viewer.renderer.picture
     # the capture point is elsewhere, and so the picture of the same step differs
     other = run.state(-20)
-    viewer.show(
-        other,
-        walk.contacts,
-        extra=viewer.step_overlay(walk.history[-1], float(run.time[-20]), other),
-    )
+    marks = viewer.step_overlay(walk.history[-1], float(run.time[-20]), other)
+    viewer.show(other, walk.contacts, extra=marks)
     now = viewer.renderer.picture
-    assert all(now[path].shape is shapes[path] for path in now)
-    assert (
-        np.abs(
-            now["dcm"].matrix[:2, 3] - viewer.walk_overlay(walk, run.final)["dcm"].matrix[:2, 3]
-        ).max()
-        > 1e-4
-    )
+    assert all(now[path].shape is before[path].shape for path in now)
+    assert np.abs(now["dcm"].matrix - before["dcm"].matrix).max() > 1e-4
 
 
 def test_a_stored_step_is_drawn_as_it_was_planned(viewer, walked):
     run, walk = walked
     step, t = walk.history[2], walk.history[2].time + 0.1
-    row = int(np.searchsorted(run.time, t - 1e-9))
-    look = viewer.step_overlay(step, t, run.state(row))
+    look = viewer.step_overlay(step, t, run.state(int(np.searchsorted(run.time, t - 1e-9))))
     assert set(step.swings) == set(run.contacts.names) - set(step.stance) and len(step.swings) == 2
-    assert {path for path in look if path.startswith("swing/")} == {
-        f"swing/{foot}" for foot in step.swings
-    }
+    expected = {f"swing/{foot}" for foot in step.swings}
+    assert {path for path in look if path.startswith("swing/")} == expected
     assert_allclose(look["zmp"].matrix[:2, 3], step.plan.zmp(t), atol=ROUNDED)
-    for foot, place in step.footholds.items():
-        assert_allclose(look[f"foothold/{foot}"].matrix[:2, 3], place[:2], atol=ROUNDED)
 
 
 def test_a_walk_has_no_marks_before_its_first_control_step(viewer, go2, standing):
@@ -143,80 +110,49 @@ def test_a_walk_has_no_marks_before_its_first_control_step(viewer, go2, standing
 
 def test_soles_are_outlined_with_position_and_rotation_at_touchdown(biped):
     run, walk = biped
-    viewer = Viewer(run.robot)
-    try:
+    with closing(Viewer(run.robot)) as viewer:
         look = viewer.walk_overlay(walk, run.final)
-        (foot,) = walk.swings
-        outline = vertices(look[f"foothold/{foot}"])
-        corners = run.robot.feet[0].corners[:, :2]
-        middle = outline[:, :2].mean(axis=0)
-        # m: the sole's frame is in its middle
-        assert_allclose(middle, walk.footholds[foot][:2], atol=1e-3)
-        radii = np.linalg.norm(outline[:4, :2] - middle, axis=1)
-        # vertices are 16-bit numbers
-        assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)
-        x, y = look[f"foothold/{foot}"].matrix[:2, 0]
-        left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
-        base = run.final.frame_pose("base").rotation
-        assert np.arctan2(y, x) == pytest.approx(np.arctan2(base[1, 0], base[0, 0]) + left)
-    finally:
-        viewer.close()
-
-
-def test_marks_have_legend_entries_and_no_colour_of_a_force_or_a_cone(viewer, walked):
-    run, walk = walked
-    viewer.show(
-        run.final, walk.contacts, extra=viewer.walk_overlay(walk, run.final), title="go2 trots"
-    )
-    items = viewer.window.scene.commands()["/", "set_legend", ""]["items"]
-    shown = {text: (colour, symbol) for colour, text, symbol in items}
-    assert shown["capture point"] == (hex_code(COM), "ring")
-    assert shown["centre of mass"] == (hex_code(COM), "disc")
-    assert shown["planned ZMP"] == (hex_code(viewer.painter.text_colour), "diamond")
-    assert shown["planned foothold"] == (hex_code(GREYS[1]), "ring") and "swing path" in shown
-    assert len({*shown.values()}) == len(shown)  # two of one colour differ in their symbol
-    kinds = {key: colour for key, colour, _ in LEGEND if key in ("dcm", "zmp", "foothold", "swing")}
-    assert len(kinds) == 4 and not {MEASURED, PLANNED, *CONE.values()} & set(kinds.values())
+    (foot,) = walk.swings
+    outline = vertices(look[f"foothold/{foot}"])[:, :2]
+    corners = run.robot.feet[0].corners[:, :2]
+    middle = outline.mean(axis=0)
+    # m: the sole's frame is in its middle, and vertices are 16-bit numbers
+    assert_allclose(middle, walk.footholds[foot][:2], atol=1e-3)
+    radii = np.linalg.norm(outline[:4] - middle, axis=1)
+    assert_allclose(radii, np.linalg.norm(corners, axis=1), atol=1e-3)
+    x, y = look[f"foothold/{foot}"].matrix[:2, 0]
+    left = walk.yaw_rate * (walk.swings[foot].touchdown - walk.time)
+    base = run.final.frame_pose("base").rotation
+    assert np.arctan2(y, x) == pytest.approx(np.arctan2(base[1, 0], base[0, 0]) + left)
 
 
 def test_invalid_overlays_are_refused_by_name(viewer, walked):
     run, walk = walked
-    refused(lambda: viewer.walk_overlay(None, run.final), InputError, "walk", "Walk", "None")
-    with raises(InputError, "go2", "solo12"):
-        viewer.walk_overlay(walk, fb.load("solo12").standing())
-    with raises(InputError, "step", "StepPlan", "Walk"):
-        viewer.step_overlay(walk, 0.0, run.final)
-    with raises(UnknownNameError, "go2", "paw"):
-        viewer.step_overlay(renamed(walk.history[1]), 0.0, run.final)
-    with raises(InputError, "t", np.nan):
-        viewer.step_overlay(walk.history[1], np.nan, run.final)
-    refused(lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history")
-    refused(lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout")
-
-
-def renamed(step: StepPlan) -> StepPlan:
-    return dataclasses.replace(step, footholds={"paw": np.zeros(3)})
+    final, step = run.final, walk.history[1]
+    paw = dataclasses.replace(step, footholds={"paw": np.zeros(3)})
+    solo = fb.load("solo12").standing()
+    for call, error, *named in (
+        (lambda: viewer.walk_overlay(None, final), InputError, "walk", "Walk", "None"),
+        (lambda: viewer.walk_overlay(walk, solo), InputError, "go2", "solo12"),
+        (lambda: viewer.step_overlay(walk, 0.0, final), InputError, "step", "StepPlan", "Walk"),
+        (lambda: viewer.step_overlay(paw, 0.0, final), UnknownNameError, "go2", "paw"),
+        (lambda: viewer.step_overlay(step, np.nan, final), InputError, "t", np.nan),
+        (lambda: viewer.play(run, steps=walk), InputError, "steps", "Walk", "walk.history"),
+        (lambda: viewer.play(run, steps=[run]), InputError, "step", "StepPlan", "Rollout"),
+    ):
+        refused(call, error, *named)
 
 
 def test_a_recorded_walk_plays_with_its_marks(viewer, walked):
     run, walk = walked
     viewer.play(run, steps=walk.history)
-    (command,) = (
-        c for (_, kind, _), c in viewer.window.scene.commands().items() if kind == "set_animation"
-    )
-    tracks = {
-        (clip["path"], track["name"]): track
-        for clip in command["animations"]
-        for track in clip["clip"]["tracks"]
-    }
-    # after standing: one pair lifts, then the other
-    first, second = (walk.history[1], walk.history[2])
+    moving = tracks(viewer)
+    first, second = walk.history[1], walk.history[2]  # one pair lifts, then the other
     for foot in first.swings:
-        track = tracks[f"/meshcat/swing/{foot}", ".visible"]
-        times, seen = np.array(track["times"]), np.array(track["values"])
+        times, seen = moving[f"swing/{foot}", ".visible"]
         assert seen[(times >= first.time) & (times < second.time)].all()
         assert not seen[times < first.time].any()
-    assert ("/meshcat/dcm", ".position") in tracks
+    assert ("dcm", ".position") in moving
     before = set(viewer.renderer.picture)
     viewer.play(run)
     expected = {"dcm", "zmp", "foothold", "swing"}

@@ -96,17 +96,14 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 
 
 @pytest.mark.front_end
-def test_a_hundred_thousand_updates_for_a_page_that_never_reads_take_no_memory(
-    window: Window, sleeper: socket.socket
-) -> None:
+def test_updates_for_a_page_that_never_reads_take_no_memory(window, sleeper):
     (_, command) = protocol.set_object("/meshcat/a", msgpack.packb({"data": "x" * 20_000}))
 
     def draw(n: int) -> None:
         for i in range(n):
             path = f"/meshcat/{i % 5}"
-            window.put(
-                [((path, "set_object", ""), command), protocol.set_transform(path, np.eye(4))]
-            )
+            shape = ((path, "set_object", ""), command)
+            window.put([shape, protocol.set_transform(path, np.eye(4))])
 
     draw(5_000)
     before = memory()

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, suppress
+from contextlib import closing
 from threading import Event
 
 import numpy as np
@@ -28,20 +28,17 @@ def test_the_robots_are_listed(capsys):
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(catalogue())
 
 
-def test_a_wrong_name_or_port_is_a_message_not_a_traceback(capsys):
-    assert main(["view", "go3", "--no-browser"]) == 2
-    assert not missing(capsys.readouterr().err, "go3", "go2")
-    assert main(["view", "go2", "--no-browser", "--port", "99999"]) == 2
-    assert not missing(capsys.readouterr().err, "port", 99999)
-
-
-def test_a_wrong_foot_or_path_of_a_urdf_is_reported(tmp_path, capsys):
+def test_wrong_arguments_are_a_message_and_not_a_traceback(tmp_path, capsys):
     file = tmp_path / "mine.urdf"
     file.write_text(load("solo12").urdf)
-    assert main(["view", str(file), "--no-browser", "--feet", "FL_FOTT"]) == 2
-    assert "FL_FOTT" in capsys.readouterr().err
-    assert main(["view", str(tmp_path / "none.urdf"), "--no-browser"]) == 2
-    assert "none.urdf" in capsys.readouterr().err
+    for arguments, *named in (
+        (["go3"], "go3", "go2"),
+        (["go2", "--port", "99999"], "port", 99999),
+        ([str(file), "--feet", "FL_FOTT"], "FL_FOTT"),
+        ([str(tmp_path / "none.urdf")], "none.urdf"),
+    ):
+        assert main(["view", *arguments, "--no-browser"]) == 2
+        assert not missing(capsys.readouterr().err, *named)
 
 
 @pytest.mark.front_end
@@ -105,95 +102,70 @@ def playground(go2: Robot) -> Iterator[Playground]:
 
 
 def test_the_controls_reach_the_robot(page, playground, go2):
+    session, run = playground.session, playground.run
+
     def drawn() -> set[str]:
         return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control(page, "CoM x [cm]", "setValue(4)")
-    eventually(
-        page, lambda: abs(playground.session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01
-    )
+    eventually(page, lambda: abs(session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01)
     control(page, "facets", "setValue(6)")
     control(page, "friction μ model", "setValue(0.3)")
-    eventually(page, lambda: abs(playground.session.settings.friction[0] - 0.3) < 1e-9)
-    eventually(
-        page, lambda: (playground.session.settings.facets, playground.view.painter.facets) == (6, 6)
-    )
+    eventually(page, lambda: abs(session.settings.friction[0] - 0.3) < 1e-9)
+    eventually(page, lambda: (session.settings.facets, playground.view.painter.facets) == (6, 6))
     picture(page, "bare_page")
     control(page, "pause", "fire()")
-    eventually(page, lambda: playground.run.status == "paused")
-    playground.run.close()  # waits for the last slice
-    stopped = playground.session.sim.time
+    eventually(page, lambda: run.status == "paused")
+    run.close()  # waits for the last slice
+    stopped = session.sim.time
     control(page, "lift FL_foot", "setValue(true)")
     control(page, "run", "fire()")
-    eventually(
-        page, lambda: playground.session.sim.time > stopped and "measured/FL_foot" not in drawn()
-    )
+    eventually(page, lambda: session.sim.time > stopped and "measured/FL_foot" not in drawn())
     assert "measured/FR_foot" in drawn()
 
 
 @pytest.mark.front_end
-def test_the_page_makes_it_walk_and_turn_and_stand_where_it_is(page, playground):
+def test_the_page_makes_the_robot_walk_and_stand_where_it_is(page, playground):
     def place() -> np.ndarray:
         return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
     control(page, "velocity x [m/s]", "setValue(0.5)")
-    control(page, "yaw rate [rad/s]", "setValue(0.5)")
     control(page, "gait", "setValue(2)")
     eventually(page, lambda: place()[0] > 0.3)
-    picture(page, "bare_page_walking")
     control(page, "gait", "setValue(0)")
-    eventually(
-        page,
-        lambda: (
-            playground.session.last.contacts_at(-1).names
-            == tuple(foot.frame for foot in playground.robot.feet)
-        ),
-    )
+    eventually(page, lambda: len(playground.session.last.contacts_at(-1)) == 4)
     stopped = place()
-    control(page, "CoM z [cm]", "setValue(-2)")  # it stands from now on where it is
+    control(page, "CoM z [cm]", "setValue(-2)")
     eventually(page, lambda: place()[2] < stopped[2] - 0.01)
-    assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1 and playground.run.status == "running"
-    control(page, "gait", "setValue(1)")
+    assert np.linalg.norm(place()[:2] - stopped[:2]) < 0.1
     control(page, "reset", "fire()")
-    eventually(
-        page, lambda: playground.run.status == "running" and np.linalg.norm(place()[:2]) < 0.05
-    )
+    eventually(page, lambda: np.linalg.norm(place()[:2]) < 0.05)
 
 
 @pytest.mark.front_end
-def test_the_page_pushes_where_the_handle_points_and_shows_what_stopped_the_run(page, playground):
-    from playwright.sync_api import TimeoutError as PlaywrightTimeoutError
-
+def test_the_page_draws_the_push_and_shows_what_stopped_the_run(page, playground):
     page.goto(playground.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control(page, "towards [°]", "setValue(-90)")
     control(page, "push [N]", "setValue(40)")
     drawn = "viewer.scene_tree.find(['meshcat', 'push']).object"
-    arrow = None
-    for _ in range(
-        8
-    ):  # the arrow stays for half a second, in which a busy machine may draw no frame
-        control(page, "push", "fire()")
-        with suppress(PlaywrightTimeoutError):
-            # its shape comes with one message, its direction, which is not up, with the next
-            turned = f"{drawn}.children.length > 0 && {drawn}.matrix.elements[10] < 0.5"
-            seen = f"{turned} && Array.from({drawn}.matrix.elements.slice(8, 11))"
-            arrow = page.wait_for_function(seen, timeout=4000).json_value()
-            break
-    assert arrow is not None
+    # its shape comes with one message, its direction, which is not up, with the next
+    turned = f"{drawn}.children.length > 0 && {drawn}.matrix.elements[10] < 0.5"
+    # once a second: the arrow stays for half a second, in which a busy machine may draw no frame
+    push = "Date.now() % 1000 < 50 && viewer.gui_controllers['push'].fire()"
+    seen = f"({push}, {turned}) && Array.from({drawn}.matrix.elements.slice(8, 11))"
+    arrow = page.wait_for_function(seen).json_value()
     assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
-    picture(page, "bare_page_pushed")
     page.wait_for_function(f"{drawn}.children.length == 0")
     playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
-    page.wait_for_function(
-        "document.getElementById('title').textContent.includes('fell: press reset')"
-    )
+    title = "document.getElementById('title').textContent"
+    page.wait_for_function(f"{title}.includes('fell: press reset')")
     control(page, "reset", "fire()")
-    page.wait_for_function("!document.getElementById('title').textContent.includes('fell')")
+    page.wait_for_function(f"!{title}.includes('fell')")
     assert playground.run.status == "running"
 
 

@@ -39,19 +39,16 @@ def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_box
     pytest.importorskip("collada", reason="the originals are read with pycollada")
     robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
-    visuals = pin.buildGeomFromUrdfString(
-        robot.model, robot.urdf, pin.VISUAL, package_dirs=folders
-    ).geometryObjects
+    found = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders)
+    visuals = {(one.parentJoint, Path(one.meshPath).stem) for one in found.geometryObjects}
     pieces = urdf_visuals(robot)
-    assert {(piece.joint, piece.source) for piece in pieces} == {
-        (visual.parentJoint, Path(visual.meshPath).stem) for visual in visuals
-    }
+    assert {(piece.joint, piece.source) for piece in pieces} == visuals
     light = robot_meshes(robot)
     assert {mesh.joint for mesh in light} == {piece.joint for piece in pieces}
     for mesh in light:
         own = np.vstack([piece.mesh.vertices for piece in pieces if piece.joint == mesh.joint])
-        assert_allclose(mesh.vertices.min(axis=0), own.min(axis=0), atol=BOX)
-        assert_allclose(mesh.vertices.max(axis=0), own.max(axis=0), atol=BOX)
+        for corner in (np.min, np.max):
+            assert_allclose(corner(mesh.vertices, axis=0), corner(own, axis=0), atol=BOX)
 
 
 def test_light_meshes_reach_down_to_the_contacts():
@@ -96,18 +93,14 @@ def test_light_meshes_belong_to_a_urdf_and_not_to_a_name():
     """
     urdf = load("go2").urdf
     light = [mesh.vertices for mesh in robot_meshes(load("go2"))]
-    for old, new, same in (
-        ("6.921", "7.5", True),
-        ("0 0.0955 0", "0 0.12 0", True),
-        ("0 0 -0.213", "0 0 -0.25", False),
+    for old, new, name, same in (
+        ("6.921", "7.5", "mine", True),
+        ("0 0.0955 0", "0 0.12 0", "mine", True),
+        ("0 0 -0.213", "0 0 -0.25", "go2", False),
     ):
         assert old in urdf
-        drawn = [
-            mesh.vertices
-            for mesh in robot_meshes(
-                load_urdf(urdf.replace(old, new), name="mine" if same else "go2")
-            )
-        ]
+        robot = load_urdf(urdf.replace(old, new), name=name)
+        drawn = [mesh.vertices for mesh in robot_meshes(robot)]
         assert same == (len(drawn) == len(light) and all(map(np.array_equal, drawn, light)))
     ankle = re.sub('"FL_foot_joint"\\s*type="fixed"', '"FL_foot_joint" type="continuous"', urdf)
     walker = load_urdf(re.sub('<axis\\s*xyz="0 0 0"', '<axis xyz="0 1 0"', ankle))

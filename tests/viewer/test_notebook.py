@@ -8,7 +8,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from typing import Any
 
 import nbformat
 import numpy as np
@@ -25,7 +26,7 @@ from floatbase.viewer.scene import protocol
 from floatbase.viewer.transport.window import Window
 from floatbase.viewer.web import pages
 
-from .looks import CONTEXTS, DRAWN, picture
+from .looks import CONTEXTS, DRAWN, eventually, picture
 from .notebook import Client, Notebook, hear
 from .test_window import STRANGE
 
@@ -128,40 +129,25 @@ def busy(shell: InteractiveShell) -> Iterator[None]:
     shell.events.trigger("post_run_cell", None)
 
 
-def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(shell, cell_window):
-    client = shown(cell_window, in_cell=True)
-    with busy(shell):
-        draw_for(cell_window, 1.0)
-        frames = frames_of(client)
-        assert 4 <= frames <= 1.1 / BLIND + 2
-    put(cell_window, -1)
-    assert client.hears_nothing()  # what is under way has not been answered yet, now that it can be
-    client.drawn(1 + frames)
-    assert newest(client.commands()) == -1
-
-
-def test_a_page_in_a_subshell_is_heard_while_a_cell_runs_so_it_is_waited_for(shell, cell_window):
-    client = shown(cell_window)
+@pytest.mark.parametrize(
+    ("in_cell", "constant", "value", "least", "most"),
+    [
+        (True, "TIMEOUT", 0.4, 4, 0.6 / BLIND + 2),  # a long cell does not make a page look lost
+        (True, "MAX_UNANSWERED", 1000, 2, 10),  # of 119 bytes each
+        (False, "TIMEOUT", 30.0, 2, 2),  # a subshell hears the page, so its answer is awaited
+    ],
+)
+def test_the_picture_moves_while_a_cell_keeps_the_kernel_busy(
+    shell, cell_window, monkeypatch, in_cell, constant, value, least, most
+):
+    monkeypatch.setattr(f"floatbase.viewer.transport.connection.{constant}", value)
+    client = shown(cell_window, in_cell=in_cell)
     with busy(shell):
         draw_for(cell_window, 0.5)
-        assert frames_of(client) == 2
-
-
-def test_what_is_sent_to_a_page_that_cannot_answer_is_bounded(shell, cell_window, monkeypatch):
-    monkeypatch.setattr("floatbase.viewer.transport.connection.MAX_UNANSWERED", 1000)
-    client = shown(cell_window, in_cell=True)
-    with busy(shell):
-        draw_for(cell_window, 1.0)
-        assert 2 <= frames_of(client) <= 10  # of 119 bytes each
-
-
-def test_a_long_cell_does_not_make_a_page_look_lost(shell, cell_window, monkeypatch):
-    monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.4)
-    client = shown(cell_window, in_cell=True)
-    with busy(shell):
-        draw_for(cell_window, 1.0)
+        frames = frames_of(client)
+        assert least <= frames <= most
     put(cell_window, -1)
-    frames = frames_of(client)
+    assert client.hears_nothing()  # the last frame can be answered now, but has not been
     client.drawn(1 + frames)
     assert newest(client.commands()) == -1 and cell_window.n_pages == 1
 
@@ -188,13 +174,10 @@ def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):
 
 
 def test_a_newer_display_retires_the_one_before_which_shows_its_image(window):
-    put(window, 1)
-    first = window.widget("a", 100, b"png")
-    client = Client(first)
-    client.commands()
-    until(lambda: window.n_pages == 1)
+    client = shown(window)
+    client.widget.thumbnail = b"png"
     second = window.widget("a", 100)
-    assert (first.is_live, first.thumbnail, second.is_live) == (False, b"png", True)
+    assert (client.widget.is_live, client.widget.thumbnail, second.is_live) == (False, b"png", True)
     until(lambda: window.n_pages == 0)
     put(window, 2)
     assert client.hears_nothing()
@@ -219,26 +202,14 @@ def test_the_code_of_the_page_is_sent_when_a_page_asks_for_it(window):
 
 
 def test_unknown_messages_of_a_notebook_page_are_ignored(window, caplog):
-    put(window, 1)
-    widget = window.widget("a", 100)
-    client = Client(widget)
-    client.commands()
-    for content in (
-        None,
-        3,
-        "x",
-        [],
-        {},
-        {"page": "page"},
-        {"page": 3, "say": "hello"},
-        {"page": "page", "say": {}},
-    ):
-        hear(widget, content)
-    for words in STRANGE:
+    client = shown(window)
+    incomplete = [{}, {"page": "page"}, {"page": 3, "say": "hello"}, {"page": "page", "say": {}}]
+    for content in (None, 3, "x", [], *incomplete):
+        hear(client.widget, content)
+    numbers = [json.dumps({"type": "done", "number": number}) for number in ("many", 10**400)]
+    for words in (*STRANGE, *numbers):
         if isinstance(words, str) and words != "hello":
             client.say(words)
-    client.say(json.dumps({"type": "done", "number": "many"}))
-    client.say(json.dumps({"type": "done", "number": 10**400}))
     put(window, 2)
     assert newest(client.commands()) == 2.0
     assert not [record for record in caplog.records if record.levelname in ("WARNING", "ERROR")]
@@ -252,10 +223,7 @@ def test_pages_that_leave_without_a_word_are_forgotten_in_the_end(window):
 
 
 def test_a_closed_window_informs_its_pages_once_and_new_ones_on_request(window):
-    widget = window.widget("a", 100)
-    put(window, 1)
-    client = Client(widget)
-    client.commands()
+    client = shown(window)
     window.close()
     assert client.message()[0] == {"closed": True} and client.hears_nothing()
     client.say("hello")
@@ -273,44 +241,48 @@ def notebook(page) -> Iterator[Notebook]:
     opened.close()
 
 
+TITLE = "document.getElementById('title').textContent"
+
+
+def displayed(notebook: Notebook, page: Any, viewer: Viewer) -> Any:
+    """Display a viewer in the notebook; return its frame, when it has drawn."""
+    frame = notebook.show(page, viewer.widget())
+    frame.wait_for_function(DRAWN)
+    return frame
+
+
 @pytest.mark.front_end
 def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
     notebook, page, standing
 ):
     viewer, *others = (Viewer(standing.robot, height=100) for _ in range(3))
     viewer.show(standing)
-    frames = [notebook.show(page, view.widget()) for view in (viewer, *others)]
-    for frame in frames:
-        frame.wait_for_function(DRAWN)
+    frame, *_ = (displayed(notebook, page, view) for view in (viewer, *others))
     code = len(gzip.compress(pages.viewer_code(), 9, mtime=0))
     assert notebook.sizes.count(code) == 1
-    frames[0].evaluate("window.old = true")
+    frame.evaluate("window.old = true")
     notebook.lose = 1
     viewer.show(standing, com=False)
     until(lambda: notebook.lose == 0)
     viewer.show(standing, com=False, title="the next one")
-    frames[0].wait_for_function("!window.old")
-    frames[0].wait_for_function(DRAWN)
-    assert frames[0].evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
+    frame.wait_for_function("!window.old")
+    frame.wait_for_function(DRAWN)
+    assert frame.evaluate("!viewer.scene_tree.find(['meshcat']).children.com?.children.ball")
     for view in (viewer, *others):
         view.close()
 
 
 @pytest.mark.front_end
 def test_an_earlier_output_shows_its_image_and_the_newest_is_live(notebook, page, standing):
-    viewer = Viewer(standing.robot, height=170)  # so that both outputs are in sight
-    first = notebook.show(page, viewer.show(standing).widget())
-    first.wait_for_function(DRAWN)
-    second = notebook.show(page, viewer.show(standing, title="second").widget())
-    second.wait_for_function(DRAWN)
-    page.wait_for_function("document.querySelectorAll('.output').length == 2")
-    page.wait_for_function("document.querySelectorAll('iframe').length == 1")
-    assert page.locator(".output").first.locator("img").is_visible()
-    assert "newer output" in page.locator(".output").first.inner_text()
-    viewer.show(standing, title="still live")
-    second.wait_for_function("document.getElementById('title').textContent == 'still live'")
-    picture(page, "retired_output")
-    viewer.close()
+    with closing(Viewer(standing.robot, height=170)) as viewer:  # both outputs are in sight
+        displayed(notebook, page, viewer.show(standing))
+        second = displayed(notebook, page, viewer.show(standing, title="second"))
+        page.wait_for_function("document.querySelectorAll('.output').length == 2")
+        page.wait_for_function("document.querySelectorAll('iframe').length == 1")
+        assert page.locator(".output").first.locator("img").is_visible()
+        viewer.show(standing, title="still live")
+        second.wait_for_function(f"{TITLE} == 'still live'")
+        picture(page, "retired_output")
 
 
 @pytest.mark.front_end
@@ -321,20 +293,14 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(notebook, page,
         notebook.show(page, view.widget())
     frames = page.locator("iframe").element_handles()
     awake = "Boolean(window.viewer) && !viewer.resting()"
+    visible = "getComputedStyle(viewer.renderer.domElement).visibility == 'visible'"
     for i in (*range(0, len(views), 2), 0):  # two in sight, and two that have just left it
         frames[i].evaluate("(frame) => frame.scrollIntoView()")
         for frame in (frames[i], frames[i + 1]):
             inside = frame.content_frame()
             inside.wait_for_function(DRAWN)
-            inside.wait_for_function(
-                f"{awake} && getComputedStyle(viewer.renderer.domElement).visibility == 'visible'"
-            )
-        until(
-            lambda: (
-                page.wait_for_timeout(20)
-                or sum(f.content_frame().evaluate(awake) for f in frames) <= 2
-            )
-        )
+            inside.wait_for_function(f"{awake} && {visible}")
+        eventually(page, lambda: sum(f.content_frame().evaluate(awake) for f in frames) <= 2)
     for view in views:
         view.close()
 
@@ -343,11 +309,9 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(notebook, page,
 def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
     notebook, page, viewer, standing
 ):
-    viewer.show(standing)
-    frame = notebook.show(page, viewer.widget())
-    frame.wait_for_function(DRAWN)
+    frame = displayed(notebook, page, viewer.show(standing))
     viewer.show(standing, title="the second frame")
-    frame.wait_for_function("document.getElementById('title').textContent == 'the second frame'")
+    frame.wait_for_function(f"{TITLE} == 'the second frame'")
     page.evaluate(LOADS)
     with notebook.deaf() as said:
         page.evaluate("() => document.body.append(document.querySelector('.output'))")
@@ -357,7 +321,7 @@ def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes
             time.sleep(0.05)
         assert page.evaluate("loads") == 1
     frame = page.locator(".output iframe").element_handle().content_frame()
-    frame.wait_for_function("document.getElementById('title').textContent == 'the second frame'")
+    frame.wait_for_function(f"{TITLE} == 'the second frame'")
     assert page.evaluate("loads") == 1
 
 
@@ -368,12 +332,10 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
     page.goto(f"{notebook.url}{address}")
     page.wait_for_function("window.started")
     page.evaluate(COUNTED)
-    viewer.show(standing)
-    frame = notebook.show(page, viewer.widget())
-    frame.wait_for_function(DRAWN)
-    for i in range(5):
+    frame = displayed(notebook, page, viewer.show(standing))
+    for i in range(3):
         viewer.show(standing, title=f"number {i}")
-        frame.wait_for_function(f"document.getElementById('title').textContent == 'number {i}'")
+        frame.wait_for_function(f"{TITLE} == 'number {i}'")
     assert (page.evaluate("posted") == 0) == reached
 
 
@@ -382,13 +344,10 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
     notebook, page, viewer, standing, how
 ):
-    viewer.show(standing)
-    frame = notebook.show(page, viewer.widget())
-    frame.wait_for_function(DRAWN)
+    frame = displayed(notebook, page, viewer.show(standing))
     assert frame.evaluate(NOTICE) == "none"
     notebook.end() if how == "kernel" else viewer.close()
     frame.wait_for_function(f"{NOTICE} == 'block'")
-    assert "run its cell again" in frame.evaluate("document.getElementById('notice').textContent")
     assert frame.evaluate("viewer.scene_tree.find(['meshcat', 'robot']).object.visible")
     picture(page, f"notebook_without_{how}")
 
@@ -399,13 +358,11 @@ def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
     viewer.show(standing)
     data, _ = viewer._repr_mimebundle_()
     assert set(data) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}
-    assert data["text/plain"] == repr(viewer)
-    monkeypatch.setenv("FLOATBASE_VIEWER", "static")
-    shown = viewer._repr_mimebundle_()
-    assert set(shown) == {"text/html"}
-    assert "srcdoc=" in shown["text/html"]
+    with monkeypatch.context() as patch:
+        patch.setenv("FLOATBASE_VIEWER", "static")
+        shown = viewer._repr_mimebundle_()
+    assert set(shown) == {"text/html"} and "srcdoc=" in shown["text/html"]
     assert viewer.url not in shown["text/html"]
-    monkeypatch.delenv("FLOATBASE_VIEWER")
     viewer.close()
     assert set(viewer._repr_mimebundle_()) == {"text/html"}
 
@@ -429,14 +386,13 @@ push_panel(live_run(sim, controller, third), third)""",
 
 @pytest.mark.front_end
 def test_a_saved_notebook_shows_every_picture_as_html(tmp_path):
-    saved = NotebookClient(
-        new_notebook(cells=[new_code_cell(source) for source in SAVED]), timeout=120
-    ).execute()
+    path, cells = tmp_path / "saved.ipynb", [new_code_cell(source) for source in SAVED]
+    saved = NotebookClient(new_notebook(cells=cells), timeout=120).execute()
     saved.metadata.pop("widgets")  # JupyterLab saves no widgets by default
-    nbformat.write(saved, tmp_path / "saved.ipynb")
-    assert (tmp_path / "saved.ipynb").stat().st_size < 0.3 * MB
-    command = [sys.executable, "-m", "nbconvert", "--to", "html", str(tmp_path / "saved.ipynb")]
+    nbformat.write(saved, path)
+    assert path.stat().st_size < 0.3 * MB
+    command = [sys.executable, "-m", "nbconvert", "--to", "html", str(path)]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
-    html = (tmp_path / "saved.html").read_text()
+    html = path.with_suffix(".html").read_text()
     assert html.count("<img") == html.count('src="data:image/png;base64,') == 3
     assert "127.0.0.1" not in html and "widget-view" not in html

@@ -10,7 +10,6 @@ import matplotlib
 import msgpack
 import numpy as np
 import pytest
-from browsers import SCREENSHOTS
 from messages import refused
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -22,9 +21,9 @@ from floatbase.simulation import Push, Rollout
 from floatbase.viewer import Picture, Viewer, plots
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene import protocol
-from floatbase.viewer.scene.colours import ALARM, CONE, CONE_ALPHA, MEASURED
+from floatbase.viewer.scene.colours import ALARM, CONE, CONE_ALPHA
 
-from .looks import SMALL, picture, settle
+from .looks import SMALL, picture, settle, vertices
 
 matplotlib.use("agg")
 
@@ -59,10 +58,8 @@ def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray
     for clip in viewer.window.scene.commands()["/", "set_animation", ""]["animations"]:
         for track in clip["clip"]["tracks"]:
             times, values = (numbers(track[name]) for name in ("times", "values"))
-            found[clip["path"].removeprefix("/meshcat/"), track["name"]] = (
-                times,
-                values.reshape(times.size, -1),
-            )
+            key = clip["path"].removeprefix("/meshcat/"), track["name"]
+            found[key] = times, values.reshape(times.size, -1)
     return found
 
 
@@ -89,11 +86,8 @@ def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer, 
     made = record(go2, 0.2)
     held = LinearConstraint("held", 2, lambda state, t: (np.eye(2, go2.nv), np.zeros(2)))
     forces = np.hstack([made.measured, np.full((len(made), 2), np.nan)])
-    viewer.play(
-        dataclasses.replace(
-            made, contacts=made.contacts + Contacts([held]), measured=forces, planned=forces
-        )
-    )
+    contacts = made.contacts + Contacts([held])
+    viewer.play(dataclasses.replace(made, contacts=contacts, measured=forces, planned=forces))
     drawn = {path for path in viewer.renderer.picture if path.startswith("measured/")}
     assert drawn == {f"measured/{name}" for name in made.contacts.names}
 
@@ -122,14 +116,11 @@ def test_a_cone_turns_to_alarm_while_its_foot_slips_and_a_force_that_ends_is_hid
     viewer.play(record(go2))
     moving = tracks(viewer)
     times, colours = moving["cone/FL_foot/surface", "shape.material.color"]
-    slips = (times > 0.8) & (times < 1.2)
-    assert_allclose(colours[slips], np.tile(CONE["outside"], (slips.sum(), 1)), atol=1e-6)
-    assert_allclose(colours[~slips], np.tile(CONE["inside"], ((~slips).sum(), 1)), atol=1e-6)
+    slips = ((times > 0.8) & (times < 1.2))[:, None]
+    assert_allclose(colours, np.where(slips, CONE["outside"], CONE["inside"]), atol=1e-6)
     times, faint = moving["cone/RR_foot/surface", "shape.material.opacity"]  # its force ends
     expected = np.where(times <= 1.5, CONE_ALPHA["inside"], CONE_ALPHA["idle"])
     assert_allclose(faint[:, 0], expected, atol=1e-6)
-    legend = [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
-    assert "friction cone: no force" in legend
     times, visible = moving["measured/RR_foot", ".visible"]
     assert_array_equal(visible[:, 0], times <= 1.5)
     times, pushed = moving["push", ".visible"]
@@ -140,33 +131,25 @@ def test_a_foot_that_swings_has_no_cone_but_its_measured_force(viewer, go2):
     rollout = record(go2)
     swings = (rollout.time > 0.4) & (rollout.time < 1.0)
     stance = rollout.contacts.without("FL_foot")
-    walking = dataclasses.replace(
-        rollout, stances=tuple(stance if away else rollout.contacts for away in swings)
-    )
-    viewer.play(walking, support=True)
+    stances = tuple(stance if away else rollout.contacts for away in swings)
+    viewer.play(dataclasses.replace(rollout, stances=stances), support=True)
     moving = tracks(viewer)
     for part in ("cone/FL_foot/surface", "patch/FL_foot"):
         times, visible = moving[part, ".visible"]
         assert_array_equal(visible[:, 0], (times < 0.4 + 1e-6) | (times > 1.0 - 1e-6))
-    assert not {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")} & set(
-        moving
-    )
-    regions = [item for path, item in viewer.renderer.picture.items() if path.startswith("support")]
-    points = [
-        item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
-        for item in regions
-    ]
-    assert {3, 4} <= {len(numbers) // 6 for numbers in points}
+    always = {("cone/FR_foot/surface", ".visible"), ("measured/FL_foot", ".visible")}
+    assert not always & moving.keys()
+    regions = [path for path in viewer.renderer.picture if path.startswith("support")]
+    n_corners = {len(vertices(viewer.renderer.picture[path])) for path in regions}
+    assert {3, 4} <= n_corners
 
 
 def test_quaternions_do_not_jump(go2, viewer):
     rollout = record(go2)
-    angle = 4 * np.pi * rollout.time / rollout.time[-1]
-    rollout.q.flags.writeable = True
-    rollout.q[:, 3:7] = np.stack(
-        [0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], axis=1
-    )
-    viewer.play(rollout)
+    half = 2 * np.pi * rollout.time / rollout.time[-1]
+    q = np.array(rollout.q)
+    q[:, 3:7] = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
+    viewer.play(dataclasses.replace(rollout, q=q))
     _, quaternions = tracks(viewer)["robot/root_joint", ".quaternion"]
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.2
 
@@ -180,17 +163,16 @@ def test_facets_that_light_up_become_tracks(go2):
 
 
 def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer, go2, standing):
+    def drawn() -> dict:
+        commands = viewer.window.scene.commands().items()
+        return {key: value for key, value in commands if key[0].startswith("/meshcat")}
+
     viewer.show(standing)
-    before = {
-        key: value
-        for key, value in viewer.window.scene.commands().items()
-        if key[0].startswith("/meshcat")
-    }
+    before = drawn()
     viewer.play(record(go2))
     viewer.show(standing)
-    after = viewer.window.scene.commands()
-    assert after["/", "set_animation", ""]["animations"] == []
-    assert {key: value for key, value in after.items() if key[0].startswith("/meshcat")} == before
+    assert viewer.window.scene.commands()["/", "set_animation", ""]["animations"] == []
+    assert drawn() == before
 
 
 def on_its_feet(robot: Robot) -> Contacts:
@@ -198,7 +180,7 @@ def on_its_feet(robot: Robot) -> Contacts:
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
-@pytest.mark.parametrize("name", judges.sampled(catalogue(), "talos", "ur5"))
+@pytest.mark.parametrize("name", judges.sampled(catalogue(), "talos"))
 def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(
     name, tmp_path
 ):
@@ -331,20 +313,12 @@ def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer, standing, co
     assert arrow[1] == pytest.approx(length, rel=1e-3)
 
 
-def test_plots_show_the_record_in_the_colours_of_the_scene(go2):
+def test_plots_show_the_record(go2):
     rollout = record(go2)
     used = plots.friction_used(rollout, rollout.measured)
     assert used[0, 1000] == pytest.approx(0.9 / 0.6) and used[1, 1000] == 0.0
     assert np.isnan(used[3, -1])
-    figure = plots.plot_run(rollout)
-    assert [axis.get_ylabel() for axis in figure.axes] == [
-        "displacement of the CoM [mm]", "normal forces [N]", "friction / (μ · normal force)",
-        "torque / limit"
-    ]  # fmt: skip
-    assert all(MEASURED in [line.get_color() for line in axis.lines] for axis in figure.axes[1:3])
+    assert len(plots.plot_run(rollout).axes) == 4
     forces = plots.plot_forces(rollout)
     assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
-    SCREENSHOTS.mkdir(parents=True, exist_ok=True)
-    figure.savefig(SCREENSHOTS / "plots.png")
-    forces.figure.savefig(SCREENSHOTS / "plot_forces.png")
     matplotlib.pyplot.close("all")

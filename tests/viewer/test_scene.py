@@ -22,6 +22,8 @@ from floatbase.simulation import Ground, Simulation
 from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
 from floatbase.viewer.scene.colours import ALARM, CALM, IDLE, WARNING
 
+from .looks import vertices
+
 
 def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
     """Return the transforms in the scene by the rest of the path after `start`."""
@@ -45,10 +47,6 @@ def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
 
 def paths(viewer: Viewer) -> set[str]:
     return {path for path, kind, _ in viewer.window.scene.commands() if kind == "set_object"}
-
-
-def material(viewer: Viewer, path: str) -> dict[str, Any]:
-    return viewer.window.scene.commands()[path, "set_object", ""]["object"]["materials"][0]
 
 
 def test_every_joint_is_where_the_state_says(viewer, go2):
@@ -105,28 +103,18 @@ def test_the_colour_of_a_cone_shows_where_its_force_is(viewer, standing, contact
 
 
 @pytest.mark.parametrize("facets", [None, 4])
-def test_a_cone_without_a_force_is_grey_and_faint(go2, standing, contacts, forces, facets):
-    viewer = Viewer(go2, facets=facets)
-    names = contacts.point_names
-
-    def looks() -> dict[str, list[float]]:
-        commands = viewer.window.scene.commands().items()
-        return {
-            p.split("/")[3]: c["value"]
-            for (p, _, name), c in commands
-            if name == "color" and "/cone/" in p
-        }
-
-    viewer.show(standing, contacts)
-    assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
+def test_a_cone_without_a_force_is_grey(go2, standing, contacts, facets):
     up = np.tile([0.0, 0.0, go2.weight / 4], (4, 1))
-    # the second in the air, the third all but
-    viewer.show(standing, contacts, forces=up * [[1.0], [0.0], [1e-4], [1.0]])
-    assert [looks()[name][:3] for name in names] == [list(CALM), list(IDLE), list(IDLE), list(CALM)]
-    assert looks()[names[1]][3] < 0.5 * looks()[names[0]][3]
-    viewer.show(standing, contacts, forces=0 * up, planned=up)  # what is measured counts
-    assert [looks()[name][:3] for name in names] == 4 * [list(IDLE)]
-    viewer.close()
+    few = up * [[1.0], [0.0], [1e-4], [1.0]]  # the second in the air, the third all but
+    with closing(Viewer(go2, facets=facets)) as viewer:
+        for shown, expected in (
+            ({}, 4 * [IDLE]),
+            ({"forces": few}, [CALM, IDLE, IDLE, CALM]),
+            ({"forces": 0 * up, "planned": up}, 4 * [IDLE]),  # what is measured counts
+        ):
+            viewer.show(standing, contacts, **shown)
+            found = colours(viewer, "/meshcat/cone/")
+            assert [found[name] for name in contacts.point_names] == expected
 
 
 def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
@@ -145,100 +133,69 @@ def test_the_ground_lies_under_the_contacts_of_a_slope(viewer, go2, height):
     viewer.show(state, contacts, support=True)
     normal, point = normal_and_point(viewer)
     assert_allclose(normal, slope, atol=1e-6)
-    for position in (
-        *contacts.positions(state),
-        matrices(viewer, "/meshcat/com/")["projection"][:3, 3],
-    ):
+    shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
+    for position in (*contacts.positions(state), shadow):
         assert normal @ (position - point) == pytest.approx(0.0, abs=0.006)
-    lowered = viewer.window.scene.commands()["/meshcat/support", "set_object", ""]["object"]
-    corners = np.frombuffer(
-        lowered["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<i2"
-    ).reshape(-1, 3)
-    for corner in corners * lowered["object"]["matrix"][0]:
-        assert normal @ (corner - point) == pytest.approx(0.0, abs=0.002)
+    corners = vertices(viewer.renderer.picture["support"])
+    assert_allclose((corners - point) @ normal, 0.0, atol=0.003)
 
 
-def test_the_ground_is_level_unless_contacts_lie_on_a_slope(go2, standing):
+def test_the_ground_is_level_unless_contacts_lie_on_a_slope(viewer, go2, standing):
     slope = np.array([0.6, 0.0, 0.8])
     ditch = {foot.frame: [0.0, -0.4 if foot.frame[1] == "L" else 0.4, 1.0] for foot in go2.feet}
-    viewer = Viewer(go2)
-    for contacts in (
-        None,
-        Contacts.points(go2),
-        Contacts.points(go2, normals=ditch),
-        Contacts.points(go2, normals=[1, 0, 0]),
-    ):
-        viewer.show(standing, contacts)
+    # the last is a slope that the feet do not stand on
+    for normals in ([0, 0, 1], ditch, [1, 0, 0], slope):
+        viewer.show(standing, Contacts.points(go2, normals=normals))
         assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
-    # a slope that the feet do not stand on
-    viewer.show(standing, Contacts.points(go2, normals=slope))
-    assert_array_equal(normal_and_point(viewer), [[0, 0, 1], [0, 0, 0]])
-    viewer.close()
-    viewer = Viewer(go2, ground=slope)
+    viewer.set_ground(slope)
     viewer.show(standing, Contacts.points(go2))
     assert_allclose(normal_and_point(viewer)[0], slope, atol=1e-6)
-    viewer.close()
 
 
-def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(go2):
+def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(viewer, go2):
     ground = Ground(normal=[[0.0, -0.4, 1.0], [0.1, 0.4, 1.0]], offset=[0.1, 0.0])
     state = Simulation(go2, ground).state
-    viewer = Viewer(go2, ground=ground)
+    viewer.set_ground(ground)
     viewer.show(state, Contacts.points(go2), support=True)
-    item = viewer.renderer.picture["ground"]
-    points = item.shape.data["geometries"][0]["data"]["attributes"]["position"]["array"].data
-    points = np.frombuffer(points, "<f4").reshape(-1, 3)
-    clearances = ground.clearances(points)
+    clearances = ground.clearances(vertices(viewer.renderer.picture["ground"]))
     assert_allclose(clearances.min(axis=1), 0.0, atol=1e-5)
     assert np.all(np.sum(clearances < 1e-5, axis=0) > 1000)
     shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
     assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
     assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
-    viewer.close()
     with raises(InputError, "ground"):
         Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
 
 
-def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(go2):
+def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(viewer, go2):
     ground = Ground.stairs(2, 0.1, start=0.0, width=1.0)
     state = Simulation(go2, ground).state
-    viewer = Viewer(go2, ground=ground)
+    viewer.set_ground(ground)
     viewer.show(state, Contacts.points(go2), support=True)
-    shape = viewer.renderer.picture["terrain/faces"].shape.data
-    values = shape["geometries"][0]["data"]["attributes"]["position"]["array"].data
-    points = np.frombuffer(values, "<i2").reshape(-1, 3) * shape["object"]["matrix"][0]
+    points = vertices(viewer.renderer.picture["terrain/faces"])
     distances = np.abs(ground.clearances(points))
     assert np.all(distances[:, 1:].min(axis=1) < 1e-3), "every vertex lies on a box"
     for bounds in ground.box_bounds:
-        inside = np.all((points[:, :2] >= bounds[0:4:2] - 1e-3), axis=1) & np.all(
-            points[:, :2] <= bounds[1:4:2] + 1e-3, axis=1
-        )
-        heights = points[inside, 2]
+        low, high = bounds[0:4:2] - 1e-3, bounds[1:4:2] + 1e-3
+        heights = points[np.all((points[:, :2] >= low) & (points[:, :2] <= high), axis=1), 2]
         assert heights.min() == pytest.approx(0.0, abs=1e-3)
         assert heights.max() >= bounds[4] - 1e-3
     shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
     assert shadow[2] == pytest.approx(ground.height(state.com[:2]), abs=1e-5)
     viewer.set_ground(None)
     assert not any(path.startswith("terrain") for path in viewer.show(state).renderer.picture)
-    viewer.close()
 
 
 def test_polyhedra_highlight_their_active_facets(go2, standing, contacts):
-    viewer = Viewer(go2, facets=4)
     force = np.tile([0.0, 0.0, 40.0], (4, 1))
     force[0, 0] = 40 * 0.6 * np.cos(np.pi / 4)  # facet 0 looks along x
     force[1, :2] = -40 * 0.6 * np.cos(np.pi / 4)  # the edge between facets 2 and 3
-    viewer.show(standing, contacts, forces=force)
-    assert {path for path in paths(viewer) if "facet" in path} == {
-        "/meshcat/cone/FL_foot/facet 0",
-        "/meshcat/cone/FR_foot/facet 2",
-        "/meshcat/cone/FR_foot/facet 3",
-    }
-    assert colours(viewer, "/meshcat/cone/")["FL_foot"] == CALM
-    assert "friction cone: surface reached" in legend(viewer)
-    viewer.show(standing, contacts, forces=0.5 * force + [0, 0, 20.0])
-    assert not {path for path in paths(viewer) if "facet" in path}
-    viewer.close()
+    lit = {"FL_foot/facet 0", "FR_foot/facet 2", "FR_foot/facet 3"}
+    with closing(Viewer(go2, facets=4)) as viewer:
+        for forces, expected in ((force, lit), (0.5 * force + [0, 0, 20.0], set())):
+            viewer.show(standing, contacts, forces=forces)
+            facets = {path for path in paths(viewer) if "facet" in path}
+            assert facets == {f"/meshcat/cone/{name}" for name in expected}
 
 
 def test_only_given_items_are_drawn(viewer, standing, contacts, forces):
@@ -246,14 +203,10 @@ def test_only_given_items_are_drawn(viewer, standing, contacts, forces):
     bare = paths(viewer)
     viewer.show(standing, contacts, forces=forces, planned=forces, title="full")
     full = paths(viewer)
-    assert len([path for path in full if "/measured/" in path]) == 4
-    assert len([path for path in full if "/planned/" in path]) == 4
-    assert len([path for path in full if path.endswith("/surface")]) == 4
+    for part in ("/measured/", "/planned/", "/surface"):
+        assert len([path for path in full if part in path]) == 4
     assert any(path.endswith("/rim") for path in full)  # of the foot whose force is outside
     assert any("/com/" in path for path in full - bare)
-    viewer.show(standing, contacts.only("FL_foot"), forces=forces[0], com=False, cones=False)
-    expected = {"/meshcat/measured/FL_foot", "/meshcat/patch/FL_foot"}
-    assert {path for path in paths(viewer) - bare if "/scale/" not in path} == expected
     viewer.show(standing, com=False)
     assert paths(viewer) == bare
     assert viewer.window.scene.commands()["/", "set_title", ""]["text"] == ""
@@ -342,19 +295,8 @@ def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
         "measured force", "planned force", "centre of mass", "push", *cone, "support polygon",
         "desired posture",
     ]  # fmt: skip
-    viewer.show(standing, contacts, planned=forces)
-    assert legend(viewer) == ["planned force", "centre of mass", *cone]
-    viewer.show(standing, contacts, forces=0 * forces, planned=forces, cones=False, com=False)
-    assert legend(viewer) == ["planned force"]
-    viewer.show(standing, ghost=standing, ghost_name="where it began", com=False)
-    assert legend(viewer) == ["where it began"]
-    one_off = forces * [[1.0], [1.0], [1.0], [0.0]]
-    viewer.show(standing, contacts, one_off, com=False)
-    assert legend(viewer) == ["measured force", *cone, "friction cone: no force"]
     viewer.show(standing, contacts, forces * [0.0, 0.0, 1.0], com=False)
     assert legend(viewer) == ["measured force", cone[0]]
-    viewer.show(standing, contacts, com=False)
-    assert legend(viewer) == ["friction cone: no force"]
     viewer.show(standing, com=False)
     assert legend(viewer) == []
 
@@ -398,16 +340,16 @@ def test_only_a_call_of_camera_moves_the_camera_again(viewer, go2, standing):
 
 def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu():
     robot = load("talos")
-    view, contacts = Viewer(robot), Contacts.flat_feet(robot, mu=0.7)
-    view.show(robot.standing(), contacts)
+    contacts = Contacts.flat_feet(robot, mu=0.7)
     corners = contacts.positions(robot.standing())[:4]
     nearest = min(np.linalg.norm(a - b) for i, a in enumerate(corners) for b in corners[:i])
-    cones = matrices(view, "/meshcat/cone/")
+    with closing(Viewer(robot)) as view:
+        view.show(robot.standing(), contacts)
+        cones = matrices(view, "/meshcat/cone/")
     assert len(cones) == 8
     for matrix in cones.values():
         across, along = np.linalg.norm(matrix[:3, 0]), np.linalg.norm(matrix[:3, 2])
         assert across < 0.5 * nearest and across / along == pytest.approx(0.7, rel=1e-5)
-    view.close()
 
 
 def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer, go2):
@@ -420,20 +362,17 @@ def test_the_centre_of_mass_is_drawn_where_it_is_and_on_the_ground(viewer, go2):
 
 def test_every_robot_is_shown_from_every_side_in_a_scale_of_round_numbers():
     for robot in map(load, catalogue()):
-        viewer = Viewer(robot)
-        viewer.show(robot.standing())
-        assert (
-            1 <= len([path for path in paths(viewer) if "/robot/" in path]) <= robot.model.njoints
-        ), robot.name
-        eyes = set()
-        for view in PRESETS:
-            viewer.camera(view)
-            eyes.add(tuple(viewer.window.scene.commands()["/", "set_camera", ""]["position"]))
-        viewer.close()
-        assert len(eyes) == len(PRESETS), robot.name
-        assert f"{viewer.scale:.6e}"[0] in "125" and float(f"{viewer.scale:.0e}") == pytest.approx(
-            viewer.scale
-        ), robot.name
+        with closing(Viewer(robot)) as viewer:
+            viewer.show(robot.standing())
+            parts = [path for path in paths(viewer) if "/robot/" in path]
+            assert 1 <= len(parts) <= robot.model.njoints, robot.name
+            eyes = set()
+            for view in PRESETS:
+                viewer.camera(view)
+                eyes.add(tuple(viewer.window.scene.commands()["/", "set_camera", ""]["position"]))
+            assert len(eyes) == len(PRESETS), robot.name
+            rounded = float(f"{viewer.scale:.0e}")
+            assert f"{rounded:e}"[0] in "125" and rounded == pytest.approx(viewer.scale)
 
 
 def test_the_name_of_a_robot_is_text_in_the_notebook(go2):

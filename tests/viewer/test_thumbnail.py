@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from contextlib import closing
 
 import msgpack
 import numpy as np
@@ -25,9 +26,8 @@ KB = 1000
 def image(viewer: Viewer) -> np.ndarray:
     """The image of a display, (height, width, 3)."""
     data, _ = viewer._repr_mimebundle_()
-    return np.asarray(
-        Image.open(io.BytesIO(base64.b64decode(data["image/png"]))).convert("RGB")
-    ).astype(int)
+    opened = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
+    return np.asarray(opened.convert("RGB")).astype(int)
 
 
 def differing(one: np.ndarray, other: np.ndarray) -> int:
@@ -41,62 +41,53 @@ def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
     empty = image(viewer)
     robot = image(viewer.show(standing, com=False))
     assert differing(empty, robot) > 0.05 * robot[..., 0].size
-    full = image(
-        viewer.show(standing, contacts, forces, support=True, labels=True, title="a title")
-    )
+    full = image(viewer.show(standing, contacts, forces, support=True, labels=True, title="title"))
     for colour in (COM, MEASURED, CALM, ALARM):
         assert hue_pixels(full, colour) > hue_pixels(robot, colour) + 50
     lower_left = np.s_[full.shape[0] // 2 :, : full.shape[1] // 4]
-    assert differing(full[lower_left], image(viewer.show(standing, com=False))[lower_left]) > 500
+    assert differing(full[lower_left], robot[lower_left]) > 500
 
 
 def test_near_objects_hide_far_ones(viewer):
     viewer.show(viewer.robot.standing(), com=False)
     viewer.camera("front")
-
-    def post(x: float, colour: tuple[float, float, float], radius: float = 0.08) -> shapes.Item:
-        return shapes.rod([x, 0.0, 0.2], np.eye(3), 0.2, radius, colour)
-
     red, blue = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
-    viewer.draw({"far": post(-0.5, red), "near": post(0.5, blue)})
-    hidden = image(viewer)
-    viewer.draw({"far": post(-0.5, red, 0.4), "near": post(0.5, blue)})
-    beside = image(viewer)
+    near = shapes.rod([0.5, 0.0, 0.2], np.eye(3), 0.2, 0.08, blue)
+    images = []
+    for radius in (0.08, 0.4):
+        far = shapes.rod([-0.5, 0.0, 0.2], np.eye(3), 0.2, radius, red)
+        viewer.draw({"far": far, "near": near})
+        images.append(image(viewer))
+    hidden, beside = images
     assert hue_pixels(hidden, red) < 0.05 * hue_pixels(beside, red)
     assert hue_pixels(hidden, blue) > 500
 
 
-@pytest.mark.parametrize("name", ["talos", "ur5", "solo8"])
-def test_the_image_of_any_robot_is_small(name):
-    viewer = Viewer(load(name))
-    viewer.show(viewer.robot.standing())
-    data, _ = viewer._repr_mimebundle_()
+def test_the_image_of_a_robot_is_small():
+    with closing(Viewer(load("talos"))) as viewer:
+        data, _ = viewer.show(viewer.robot.standing())._repr_mimebundle_()
     assert 5 * KB < len(data["image/png"]) < 80 * KB
-    viewer.close()
 
 
-@pytest.mark.parametrize("slope", [0.0, 0.4])
-def test_the_image_goes_with_a_robot_that_is_followed(go2, standing, slope):
-    viewer = Viewer(go2, ground=[np.sin(slope), 0.0, np.cos(slope)], follow=True)
-    at_home = image(viewer.show(standing))
+def test_the_image_goes_with_a_robot_that_is_followed(go2, standing):
+    down = np.array([np.cos(0.4), 0.0, -np.sin(0.4)])
     q = standing.q.copy()
-    # a whole jump of the grid, down the slope
-    q[:3] += 2.5 * np.array([np.cos(slope), 0.0, -np.sin(slope)])
-    away = image(viewer.show(State(go2, q)))
+    q[:3] += 2.5 * down  # a whole jump of the grid, down the slope
+    with closing(Viewer(go2, ground=[-down[2], 0.0, down[0]], follow=True)) as viewer:
+        at_home = image(viewer.show(standing))
+        away = image(viewer.show(State(go2, q)))
     assert differing(at_home, away) < 0.02 * away[..., 0].size
-    viewer.close()
 
 
-def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(go2, standing):
+def test_the_camera_rises_with_a_robot_on_stairs_and_does_not_jump_at_an_edge(viewer, standing):
     ground = Ground.stairs(2, 0.1, start=0.25, run=0.5)
-    viewer = Viewer(go2, ground=ground, follow=True)
+    viewer.set_ground(ground)
     drawn, start = viewer.painter.drawn_ground, standing.com
     path = np.arange(0.0, 2.5, 0.01)
     rises = [displacement(drawn, start, start + [x, 0.0, 0.0])[2] for x in path]
     assert rises[0] == 0.0
     assert rises[-1] == pytest.approx(ground.height([2.4, 0.0]), abs=1e-9)
     assert np.abs(np.diff(rises)).max() < 0.005
-    viewer.close()
 
 
 def test_another_ground_moves_the_camera_with_the_next_picture_only(go2, standing):
