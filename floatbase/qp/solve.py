@@ -9,6 +9,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
+import numpy.typing as npt
 
 from floatbase._validation import Array, as_instance
 from floatbase.errors import InfeasibleError, SolverError, require, unknown_name
@@ -87,18 +88,47 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     """Solve a problem with soft inequalities.
 
     The penalties are exact: if the problem with hard inequalities only has a solution whose
-    multipliers are below the penalties, it is the solution. This needs no variables for violations,
-    which cost accuracy.
+    multipliers are below the penalties, it is the solution. Otherwise, variables for the violations
+    show which inequalities are violated. These variables cost accuracy: a penalty of 1e8 leaves few
+    digits for a curvature of 1e-5. The problem is therefore solved again without them.
     """
     assert qp.penalties is not None
+    violated = np.zeros(len(qp.G), dtype=bool)
+    exact = _solve_with_known_violations(qp, violated, solver)
+    if exact is not None:
+        return exact
+    found = solve(qp.with_slacks(), solver)
+    x = found.x[: qp.n]
+    excess = (qp.G[qp.soft] @ x - qp.h[qp.soft]) / qp.row_norms[qp.soft]
+    violated[qp.soft] = excess > violation_tolerance(qp.h[qp.soft] / qp.row_norms[qp.soft], x)
+    exact = _solve_with_known_violations(qp, violated, solver)
+    if exact is not None:
+        return exact
+    multipliers = found.inequality_multipliers[: len(qp.G)]
+    return Solution(qp, x, multipliers, found.solver, found.iterations)
+
+
+def _solve_with_known_violations(
+    qp: QP, violated: npt.NDArray[np.bool_], solver: str
+) -> Solution | None:
+    """Solve a problem with soft inequalities if these are the violated ones; otherwise return None.
+
+    The penalties of the violated inequalities are part of the cost, and their rows have the
+    opposite sign. All other inequalities are hard.
+    """
+    assert qp.penalties is not None
+    sign = np.where(violated, -1.0, 1.0)
+    penalties = np.where(violated, qp.penalties, 0.0)
+    hard = replace(
+        qp, g=qp.g + qp.G.T @ penalties, G=sign[:, None] * qp.G, h=sign * qp.h, penalties=None
+    )
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
         # without a search for the names of a conflict, which soft rows may resolve
-        hard = _BACK_ENDS[solver](replace(qp, penalties=None))
-        if hard is not None and np.all(hard.inequality_multipliers <= qp.penalties):
-            return replace(hard, qp=qp)
-    found = solve(qp.with_slacks(), solver)
-    multipliers = found.inequality_multipliers[: len(qp.G)]
-    return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
+        found = _BACK_ENDS[solver](hard)
+        if found is not None and np.all(found.inequality_multipliers <= qp.penalties):
+            multipliers = penalties + sign * found.inequality_multipliers
+            return Solution(qp, found.x, multipliers, found.solver, found.iterations)
+    return None
 
 
 def solvers() -> tuple[str, ...]:
@@ -208,12 +238,13 @@ def _cvxpy(qp: QP) -> Solution | None:
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
             tolerances = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance)
             problem.solve(solver=cp.CLARABEL, max_iter=200, **tolerances)
-            break
+            if problem.status != cp.USER_LIMIT:
+                break
     if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
         return None
     if problem.status in (cp.UNBOUNDED, cp.UNBOUNDED_INACCURATE):
         raise unbounded(qp)
-    if step.value is None:
+    if step.value is None or problem.status == cp.USER_LIMIT:
         raise SolverError(
             f"Clarabel did not converge on {qp!r}: it ended with status {problem.status!r}. Check "
             f"the scaling of the problem, or use another solver."

@@ -86,6 +86,22 @@ def test_a_large_weight_leaves_the_least_weighted_violation():
         assert shares @ excess == pytest.approx(least.fun, abs=1e-6)
 
 
+@pytest.mark.parametrize("solver", ["daqp", "active_set"])  # Clarabel's tolerances are larger
+def test_weights_far_apart_cost_no_digits_of_the_minimizer(solver):
+    """Weights of 1e8 and 1 beside curvatures of 1e-5: a slope of 1e-9 moves x by 1e-4."""
+    rng, n_violated = np.random.default_rng(2), 0
+    for _ in range(10):
+        qp = random_problem(rng, n=16)
+        L = np.hstack([rng.normal(size=(16, 4)), np.zeros((16, 12))])
+        H, G, h = L @ L.T + 1e-5 * np.eye(16), np.array(qp.G), np.array(qp.h)
+        G[3:6], h[:3], h[3:6] = -G[:3], 0.1, -0.6  # each light row contradicts a heavy one
+        penalties = [1e8] * 3 + [1.0] * 3 + [np.inf] * 6
+        found = solve(replace(qp, H=H, g=H @ qp.g, G=G, h=h, penalties=penalties), solver)
+        assert found.residuals.stationarity < 1e-9
+        n_violated += bool(found.violations)
+    assert n_violated > 3
+
+
 def test_only_hard_rows_can_be_in_conflict():
     rows = np.array([[1.0], [-1.0], [-1.0]])
     names = ["at most 0", "at least 1", "at least 2"]
