@@ -245,6 +245,7 @@ class Cylinders(Value):
     areas: Array
     crank: Array
     base: Array
+    _signed_areas: Array
     _dead_volume: Array
     _valve_gain: Array
     _leakage: Array
@@ -257,10 +258,12 @@ class Cylinders(Value):
         scale = as_array("scale", scale, (None,))
         if np.any(scale <= 0.0):
             raise InputError(f"scale of a cylinder is {scale.min():g}. It must be > 0.")
+        areas = read_only(np.outer(hydraulics.areas, scale ** (2.0 / 3.0)))
         vars(self).update(
             hydraulics=hydraulics,
             max_lever_angle=as_array("max_lever_angle", max_lever_angle, scale.shape, "rad"),
-            areas=read_only(np.outer(hydraulics.areas, scale ** (2.0 / 3.0))),
+            areas=areas,
+            _signed_areas=_CHAMBER_SIGN * areas,
             crank=read_only(hydraulics.crank * scale ** (1.0 / 3.0)),
             base=read_only(hydraulics.base * scale ** (1.0 / 3.0)),
             _dead_volume=hydraulics.dead_volume * scale,
@@ -414,11 +417,13 @@ class Cylinders(Value):
         ndarray, shape (2, d)
             Rates for the chambers A and B [Pa/s].
         """
-        inflow = (
-            self.valve_flows(x, pressures)
-            - self.leakage_flow(pressures)
-            - _CHAMBER_SIGN * self.areas * (geometry.lever * v)
-        )
+        return self._pressure_rates(self.valve_flows(x, pressures), pressures, geometry, v)
+
+    def _pressure_rates(
+        self, flows: Array, pressures: Array, geometry: CylinderGeometry, v: Array
+    ) -> Array:
+        """Return the rates of change of the pressures for flows from the valve [Pa/s]."""
+        inflow = flows - self.leakage_flow(pressures) - self._signed_areas * (geometry.lever * v)
         return inflow / geometry.compliance
 
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
@@ -441,12 +446,14 @@ class Cylinders(Value):
             Decay rates, never negative [1/s].
         """
         drop = self.line_pressures(x) - pressures
-        slope = (
-            self._valve_gain
-            * (0.5 * drop**2 + _LAMINAR_DROP**2)
-            / np.hypot(drop, _LAMINAR_DROP) ** 2.5
-        )
-        return (np.abs(x) * slope + self._leakage) / geometry.compliance
+        return self._decay(np.abs(x), drop, np.hypot(drop, _LAMINAR_DROP), geometry)
+
+    def _decay(
+        self, opening: Array, drop: Array, smooth_drop: Array, geometry: CylinderGeometry
+    ) -> Array:
+        """Return the decay rates for openings without their signs and pressure drops [1/s]."""
+        slope = self._valve_gain * (0.5 * drop**2 + _LAMINAR_DROP**2) / smooth_drop**2.5
+        return (opening * slope + self._leakage) / geometry.compliance
 
     def advance(
         self,
@@ -487,8 +494,12 @@ class Cylinders(Value):
         decay = np.exp(-2.0 * np.pi * self.hydraulics.valve_bandwidth * step)
         new_opening = u + (opening - u) * decay
         x = 0.5 * (opening + new_opening)
-        change = step * self.pressure_rates(x, pressures, geometry, v)
-        change /= 1.0 + step * self.pressure_decay(x, pressures, geometry)
+        # the flows and the decay share the pressure drop, which the force loop needs very often
+        drop, size = self.line_pressures(x) - pressures, np.abs(x)
+        smooth_drop = np.hypot(drop, _LAMINAR_DROP)
+        flows = size * (self._valve_gain * drop / np.sqrt(smooth_drop))
+        change = step * self._pressure_rates(flows, pressures, geometry, v)
+        change /= 1.0 + step * self._decay(size, drop, smooth_drop, geometry)
         return new_opening, np.maximum(pressures + change, VACUUM)
 
     def opening_for(

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_array, as_callable
+from floatbase._validation import Array, as_array, as_callable, cross
 
 # s, of the finite differences: their error is below 1e-5 of a base's motion in a second
 _DIFFERENCE_STEP = 1e-4
@@ -48,7 +48,7 @@ def pitch_and_yaw(
         return (
             R,
             y1 * yaw_axis + p1 * pitch_axis,
-            y2 * yaw_axis + p2 * pitch_axis + y1 * p1 * np.cross(yaw_axis, pitch_axis),
+            y2 * yaw_axis + p2 * pitch_axis + y1 * p1 * cross(yaw_axis, pitch_axis),
         )
 
     return path

@@ -6,8 +6,11 @@ collisions. Links that are welded together become one body with their combined i
 
 from __future__ import annotations
 
+import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -55,12 +58,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
     """
-    try:
-        model = build_spec(robot, ground, timestep).compile()
-    except ValueError as error:
-        raise SimulationError(
-            f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
-        ) from None
+    model = copy.copy(_compiled_model(robot, _ground_data(ground), timestep))
     if model.nv != robot.nv:
         raise SimulationError(
             f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
@@ -72,6 +70,38 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
 
 def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
     """Write the description from which `build_model` builds the model, from the same arguments."""
+    return _build_spec(robot, _ground_data(ground), timestep)
+
+
+class _GroundData(NamedTuple):
+    """The numbers of a ground that the model needs. Grounds with equal numbers are equal."""
+
+    mu: float
+    planes: tuple[tuple[float, ...], ...]  # normal, offset
+    boxes: tuple[tuple[float, ...], ...]  # both ends along x, both ends along y, top
+
+
+def _ground_data(ground: Ground) -> _GroundData:
+    """Return the numbers of a ground that the model needs."""
+    planes = np.column_stack([ground.normals, ground.offsets])
+    return _GroundData(
+        ground.mu, tuple(map(tuple, planes.tolist())), tuple(map(tuple, ground.box_bounds.tolist()))
+    )
+
+
+@lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
+def _compiled_model(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.MjModel:
+    """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it."""
+    try:
+        return _build_spec(robot, ground, timestep).compile()
+    except ValueError as error:
+        raise SimulationError(
+            f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
+        ) from None
+
+
+def _build_spec(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.MjSpec:
+    """Write the description of a model."""
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -95,13 +125,14 @@ def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
         motor.set_to_motor()
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
-    for normal, offset in zip(ground.normals, ground.offsets, strict=True):
+    for *direction, offset in ground.planes:
+        normal = np.array(direction)
         plane = spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal
         )
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
-        mujoco.mju_quatZ2Vec(plane.quat, normal.copy())
-    for x0, x1, y0, y1, top in ground.box_bounds:
+        mujoco.mju_quatZ2Vec(plane.quat, normal)
+    for x0, x1, y0, y1, top in ground.boxes:
         half = 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,7 @@ class BlackBox(Value):
 
     def equations(self, i: int | np.integer[Any]) -> fb.EquationsOfMotion:
         """Return the equations of motion in row i, with the contacts of the controller."""
-        return fb.equations_of_motion(self.state(i), self.contacts)
+        return _equations(self, as_integer("row", i, -len(self), len(self) - 1))
 
     @property
     def fell(self) -> bool:
@@ -56,3 +57,9 @@ class BlackBox(Value):
             f"BlackBox({self.name}: {self.robot.name}, {self.time[-1]:.1f} "
             f"s{', fell' if self.fell else ''})"
         )
+
+
+@lru_cache(maxsize=1024)  # the rows of a box or two, which several diagnoses read in turn
+def _equations(box: BlackBox, row: int) -> fb.EquationsOfMotion:
+    """Return the equations of motion in a row."""
+    return fb.equations_of_motion(box.state(row), box.contacts)
