@@ -88,39 +88,13 @@ _LAZY = {
 }
 
 __all__ = [
-    "QP",
-    "Affine",
-    "CoMTask",
-    "Contacts",
-    "FloatbaseError",
-    "ForceTask",
-    "FrameTask",
-    "Ground",
-    "InfeasibleError",
-    "OrientationTask",
-    "PostureTask",
-    "Push",
-    "Quadratic",
-    "Robot",
-    "Rollout",
-    "Simulation",
-    "State",
-    "TorqueTask",
-    "Viewer",
-    "WholeBodyController",
-    "accelerations_from_torques",
-    "catalogue",
-    "equations_of_motion",
-    "feasible_space",
-    "forces_from_torques",
-    "load",
-    "load_urdf",
-    "push_recovery",
-    "rollout",
-    "solve",
-    "standing_tasks",
-    "sweep",
-]
+    "QP", "Affine", "CoMTask", "Contacts", "FloatbaseError", "ForceTask", "FrameTask", "Ground",
+    "InfeasibleError", "OrientationTask", "PostureTask", "Push", "Quadratic", "Robot", "Rollout",
+    "Simulation", "State", "TorqueTask", "Viewer", "WholeBodyController",
+    "accelerations_from_torques", "catalogue", "equations_of_motion", "feasible_space",
+    "forces_from_torques", "load", "load_urdf", "push_recovery", "rollout", "solve",
+    "standing_tasks", "sweep",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

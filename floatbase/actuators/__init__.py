@@ -14,13 +14,6 @@ from floatbase.actuators.hydraulics import (
 from floatbase.actuators.lags import Delay, FirstOrderLag
 
 __all__ = [
-    "VACUUM",
-    "CylinderGeometry",
-    "Cylinders",
-    "Delay",
-    "FirstOrderLag",
-    "HydraulicActuators",
-    "HydraulicState",
-    "Hydraulics",
-    "PowerBalance",
-]
+    "VACUUM", "CylinderGeometry", "Cylinders", "Delay", "FirstOrderLag", "HydraulicActuators",
+    "HydraulicState", "Hydraulics", "PowerBalance",
+]  # fmt: skip

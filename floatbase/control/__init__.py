@@ -9,13 +9,6 @@ from floatbase.control.limits import Limits, LinearInequality
 from floatbase.control.problem import Problem, build_qp
 
 __all__ = [
-    "AnalyticController",
-    "Command",
-    "JointLimits",
-    "Limits",
-    "LinearInequality",
-    "Problem",
-    "WholeBodyController",
-    "build_qp",
-    "capture_point_inequality",
-]
+    "AnalyticController", "Command", "JointLimits", "Limits", "LinearInequality", "Problem",
+    "WholeBodyController", "build_qp", "capture_point_inequality",
+]  # fmt: skip

@@ -235,12 +235,7 @@ class Problem(Value):
                 inequality.labels(len(inequality.at(eom)[0]))
 
 
-def build_qp(
-    eom: EquationsOfMotion,
-    tasks: Sequence[Task],
-    limits: Limits,
-    t: float = 0.0,
-) -> QP:
+def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
     """Assemble the whole-body QP in x = (q̈, τ, λ) at a state.
 
     The objective is the sum of (weight / 2) ‖residual‖² of the tasks. The equality constraints are

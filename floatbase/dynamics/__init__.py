@@ -37,15 +37,11 @@ from floatbase.dynamics.subspace import (
 
 # fmt: off
 __all__ = [
-    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts",
-    "EquationsOfMotion", "FeasibleSpace",
-    "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint", "PointContact",
-    "RollingWheel",
-    "accelerations_from_torques", "bias_forces",
-    "constraint_and_jacobian", "contact_space", "coriolis_matrix",
-    "delassus_matrix", "dimensions",
+    "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts", "EquationsOfMotion",
+    "FeasibleSpace", "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint",
+    "PointContact", "RollingWheel", "accelerations_from_torques", "bias_forces",
+    "constraint_and_jacobian", "contact_space", "coriolis_matrix", "delassus_matrix", "dimensions",
     "equations_of_motion", "feasible_space", "fixed_frame", "forces_from_torques", "grasp_matrix",
     "internal_forces", "motion_matrix", "moving_frame", "resolved_constraint",
-    "torque_force_matrix",
-    "torque_force_space", "undetermined_forces", "view_from_rotating_frame",
-]
+    "torque_force_matrix", "torque_force_space", "undetermined_forces", "view_from_rotating_frame",
+]  # fmt: skip

@@ -44,10 +44,8 @@ __all__ = [
     "AngularMomentumTask", "AxisTask", "CentreOfPressureTask", "CoMTask", "ForceTask", "FrameTask",
     "OrientationTask", "PostureTask", "RelativePoseTask", "Task", "TorqueTask", "TorquesFromForces",
     "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
-    "com_wrench_map",
-    "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",
-    "minimum_norm_pullback",
-    "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum", "standing_tasks",
-    "tangential_bias",
-    "torques_from_forces", "wrench_objective",
-]
+    "com_wrench_map", "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",
+    "minimum_norm_pullback", "net_force_matrix", "net_moment_matrix", "normal_bias",
+    "partial_minimum", "standing_tasks", "tangential_bias", "torques_from_forces",
+    "wrench_objective",
+]  # fmt: skip

@@ -12,22 +12,7 @@ from floatbase.simulation.row_store import read_sweep
 from floatbase.simulation.sweep import sweep
 
 __all__ = [
-    "ACTIVE_STATUSES",
-    "Actuators",
-    "Box",
-    "Controller",
-    "Ground",
-    "Latency",
-    "LiveSimulation",
-    "Observed",
-    "Observer",
-    "Push",
-    "PushRecovery",
-    "Rollout",
-    "SensorNoise",
-    "Simulation",
-    "push_recovery",
-    "read_sweep",
-    "rollout",
-    "sweep",
+    "ACTIVE_STATUSES", "Actuators", "Box", "Controller", "Ground", "Latency", "LiveSimulation",
+    "Observed", "Observer", "Push", "PushRecovery", "Rollout", "SensorNoise", "Simulation",
+    "push_recovery", "read_sweep", "rollout", "sweep",
 ]  # fmt: skip

@@ -56,11 +56,7 @@ class Push(Value):
 
     @staticmethod
     def horizontal(
-        force: float,
-        towards: float,
-        start: float = 0.0,
-        duration: float = 0.1,
-        frame: str = "base",
+        force: float, towards: float, start: float = 0.0, duration: float = 0.1, frame: str = "base"
     ) -> Push:
         """Return a horizontal push with a magnitude and a direction.
 

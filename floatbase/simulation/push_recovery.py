@@ -259,8 +259,7 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     cloudpickle = require("cloudpickle", "sweep")
     try:
         return partial(
-            _simulation_and_controller,
-            partial(pickle.loads, cloudpickle.dumps(controller)),
+            _simulation_and_controller, partial(pickle.loads, cloudpickle.dumps(controller))
         )
     except Exception as error:
         raise InputError(

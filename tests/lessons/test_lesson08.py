@@ -9,11 +9,7 @@ import pytest
 import floatbase as fb
 from floatbase.behaviours import support_margin
 from floatbase.errors import InputError
-from floatbase.lessons.lesson08 import (
-    run_go2,
-    smallest_support_margin,
-    state_with_moved_body,
-)
+from floatbase.lessons.lesson08 import run_go2, smallest_support_margin, state_with_moved_body
 
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding
 

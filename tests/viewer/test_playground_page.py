@@ -262,7 +262,7 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
     page.wait_for_function("location.hash == '#facets=7'")
 
     page.goto("about:blank")
-    page.goto(f"{field.url}#friction+reality=0.3&gait=trot&facets=many&nothing=1")
+    page.goto(f"{field.url}#friction+μ+reality=0.3&gait=trot&facets=many&nothing=1")
     eventually(page, lambda: has(gait="trot", friction=(0.7, 0.3)))
     page.wait_for_timeout(1500)  # until the page has written its own address
     page.evaluate("location.hash = '#facets=5'")

@@ -29,11 +29,7 @@ _SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot o
 
 
 def speed_fractions(
-    gait: Gait,
-    posture: WalkingPosture,
-    reach: float,
-    motion: Array,
-    acceleration: float,
+    gait: Gait, posture: WalkingPosture, reach: float, motion: Array, acceleration: float
 ) -> tuple[float, float]:
     """Return the largest fractions of a desired motion that the feet can follow, at most 1.
 

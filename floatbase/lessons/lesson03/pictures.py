@@ -33,24 +33,7 @@ _Blocks: TypeAlias = Sequence[tuple[str, tuple[str, ...], str]]
 
 
 def show_beta(view: Viewer, space: FeasibleSpace, beta: npt.ArrayLike, cones: bool = True) -> str:
-    """Draw (q̈, τ, λ) of a β: forces as arrows, and the motion due to q̈ from rest as a ghost.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    space : FeasibleSpace
-        The space of possible motions.
-    beta : array_like, shape (dimension,)
-        The β.
-    cones : bool, optional
-        Whether to draw the friction cones as well.
-
-    Returns
-    -------
-    str
-        All the numbers as bars, as HTML.
-    """
+    """Draw (q̈, τ, λ) of a β: forces as arrows, and the motion due to q̈ from rest as a ghost."""
     qdd, tau, forces = space(beta)
     state = space.eom.state
     ghost = state.replace(q=state.integrate(0.5 * GHOST_TIME**2 * qdd), v=np.zeros(space.eom.nv))
@@ -136,20 +119,7 @@ def _bar(x: int, part: float, colour: str) -> str:
 
 
 def matrix_picture(A: npt.ArrayLike, rows: Mapping[str, int], columns: Mapping[str, int]) -> Figure:
-    """Draw the non-zero entries of a matrix, and its singular values beside them.
-
-    Parameters
-    ----------
-    A : array_like, shape (m, n)
-        The matrix.
-    rows, columns : mapping of str to int
-        The blocks of A in order: name and size.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Draw the non-zero entries of a matrix, and its singular values beside them."""
     A = np.asarray(A)
     figure, (left, right) = plt.subplots(
         1, 2, figsize=(10, 4.2), layout="constrained", width_ratios=[3, 2]
@@ -189,24 +159,7 @@ def _name_blocks(axes: Any, rows: Mapping[str, int], columns: Mapping[str, int])
 
 
 def show_knee(view: Viewer, robot: Robot, bend: float, wobble: Array) -> str:
-    """Draw solo12 standing still, and return the torques that this takes.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    robot : Robot
-        solo12.
-    bend : float
-        Angle of every knee [rad].
-    wobble : ndarray, shape (12,)
-        Internal forces in addition to those that carry the weight, in the world frame [N].
-
-    Returns
-    -------
-    str
-        The torques and bars, as HTML.
-    """
+    """Draw solo12 standing still, and return the torques that this takes."""
     contacts = fb.Contacts.points(robot)
     eom = fb.equations_of_motion(upright_solo12(robot, bend), contacts)
     forces = np.linalg.lstsq(eom.J[:, :6].T, eom.h[:6], rcond=1e-9)[0] + wobble

@@ -23,24 +23,7 @@ VALLEY_RATIO = 0.02
 def show_torques(
     view: Viewer, eom: EquationsOfMotion, tau: npt.ArrayLike, length: float = ARROW_SCALE
 ) -> Array:
-    """Draw the contact forces and the acceleration of the centre of mass that torques cause.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    eom : EquationsOfMotion
-        The equations of motion.
-    tau : array_like, shape (d,)
-        Torques [N·m].
-    length : float, optional
-        Length of an arrow for 1 m/s² [m].
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Acceleration of the centre of mass in the world frame [m/s²].
-    """
+    """Draw the contact forces and the acceleration of the centre of mass that torques cause."""
     state = eom.state
     a = state.com_jacobian @ fb.accelerations_from_torques(eom)(tau) + state.com_drift
     arrow = {}
@@ -52,20 +35,7 @@ def show_torques(
 
 
 def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
-    """Plot level curves of costs on two variables.
-
-    Yellow is a low cost. A dot marks the minimum, except where the cost is a valley.
-
-    Parameters
-    ----------
-    **costs : tuple
-        title=(cost, name of x, name of y, half the width of the picture).
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot level curves of costs on two variables."""
     figure, axes = plt.subplots(
         1, len(costs), figsize=(3.6 * len(costs), 3.5), layout="constrained", squeeze=False
     )
@@ -88,24 +58,7 @@ def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
 def level_curves(
     cost: fb.Quadratic, point: npt.ArrayLike, half: float, x_name: str, y_name: str
 ) -> str:
-    """Draw level curves of a cost on two variables, fast enough for a slider.
-
-    Parameters
-    ----------
-    cost : Quadratic
-        The cost.
-    point : array_like, shape (2,)
-        Point that is marked with a dot.
-    half : float
-        Half the width of the picture, in the units of the variables.
-    x_name, y_name : str
-        Labels of the axes.
-
-    Returns
-    -------
-    str
-        The drawing as SVG.
-    """
+    """Draw level curves of a cost on two variables, fast enough for a slider."""
     values, vectors = np.linalg.eigh(cost.H)
     values = np.maximum(values, 1e-9 * values[-1])
     centre = -vectors @ ((vectors.T @ cost.g) / values)

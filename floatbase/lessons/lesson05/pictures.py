@@ -28,28 +28,7 @@ def show_forces(
     forces: npt.ArrayLike,
     wish: npt.ArrayLike | None = None,
 ) -> str:
-    """Draw contact forces, and their wrench (f_c, τ_c) above the robot, where it is visible.
-
-    The wrench does not include the force that carries the weight.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    state : State
-        State of the robot.
-    contacts : Contacts
-        Its contacts.
-    forces : array_like, shape (k,)
-        Contact forces in the world frame [N].
-    wish : array_like, shape (3,), optional
-        Desired force in addition to the weight, in the world frame [N], drawn as a grey arrow.
-
-    Returns
-    -------
-    str
-        The wrench as HTML.
-    """
+    """Draw contact forces, and their wrench (f_c, τ_c) above the robot, where it is visible."""
     forces = as_forces(forces, contacts.k)
     wrench = com_wrench_map(state, contacts)(forces) - [0, 0, state.robot.weight, 0, 0, 0]
     wrench = np.where(np.abs(wrench) > np.repeat([LEAST_FORCE, LEAST_MOMENT], 3), wrench, 0.0)
@@ -71,22 +50,7 @@ def show_forces(
 
 
 def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> Viewer:
-    """Draw a state, and another one as a ghost, with a dark spot below the ghost's centre of mass.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    now, before : State
-        The state, and the state of the ghost.
-    name : str
-        Name of the ghost in the legend.
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Draw a state, and another one as a ghost with a dark spot below its centre of mass."""
     x, y, _ = before.com
     spot = shapes.contact_patch([x, y, 0.0], [0.0, 0.0, 1.0], 0.035 * view.painter.size)
     stem = shapes.rod([x, y, 0.0], np.eye(3), before.com[2], 0.005 * view.painter.size, GREYS[0])
@@ -97,22 +61,7 @@ def show_moved_com(view: Viewer, now: fb.State, before: fb.State, name: str) -> 
 
 
 def plot_planned_pull(record: Rollout, until: float) -> Figure:
-    """Plot planned and measured normal forces with a line at zero.
-
-    The vertical axis is limited to `PLOT_RANGE`.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-    until : float
-        End of the time axis [s].
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot planned and measured normal forces with a line at zero."""
     figure, axis = plt.subplots(figsize=(8, 3.2), layout="constrained")
     plots.plot_forces(record, axis)
     axis.axhline(0.0, color=hex_code(GREYS[0]), linewidth=1.0)
@@ -123,16 +72,7 @@ def plot_planned_pull(record: Rollout, until: float) -> Figure:
 
 
 def plot_constrained_minimum() -> Figure:
-    """Plot a cost of two variables, a linear constraint, and the slope at two of its points.
-
-    At the constrained minimum, the downhill direction is along the normal of the constraint. At
-    every other point of the constraint, a part of the downhill direction is along the constraint.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot a cost of two variables, a linear constraint, and the slope at two of its points."""
     cost = fb.Quadratic.from_residual([[1.0, 0.3], [0.0, 1.4]], [1.6, 2.4])
     normal, along = np.array([1.0, 1.0]) / np.sqrt(2), np.array([1.0, -1.0]) / np.sqrt(2)
     line = fb.Affine(along[:, None], 0.4 * normal)  # distance along the constraint -> point

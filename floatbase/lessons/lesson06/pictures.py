@@ -24,22 +24,7 @@ DRAWING_SIZE = (250, 250)  # pixels of a drawing from above
 
 
 def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
-    """Draw a round cone about the vertical with a force at its tip.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    force : array_like, shape (3,)
-        The force in the world frame [N].
-    mu : float
-        Friction coefficient [-].
-
-    Returns
-    -------
-    str
-        What (28) says about the force.
-    """
+    """Draw a round cone about the vertical with a force at its tip."""
     cone, f = FrictionCone(np.array([0.0, 0.0, 1.0]), mu), np.asarray(force, dtype=np.float64)
     tip, status = np.zeros(3), cone.status(f)
     drawn = {"/surface": shapes.friction_cone(tip, cone.normal, mu, CONE_HEIGHT, status)}
@@ -62,22 +47,7 @@ def show_force(view: Viewer, force: npt.ArrayLike, mu: float) -> str:
 
 
 def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
-    """Draw a cone, the polyhedron inside it, and a force that leans as far forwards as possible.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    mu : float
-        Friction coefficient [-].
-    facets : int
-        Number of facets.
-
-    Returns
-    -------
-    str
-        The polyhedra inside and outside from above with their areas, as SVG.
-    """
+    """Draw a cone, the polyhedron inside it, and a force that leans as far forwards as possible."""
     inner, outer = (
         FrictionPolyhedron(np.array([0.0, 0.0, 1.0]), mu, facets, inside)
         for inside in (True, False)
@@ -112,18 +82,7 @@ def show_polyhedron(view: Viewer, mu: float, facets: int) -> str:
 
 
 def compass_row(**stances: WrenchSet) -> Figure:
-    """Plot horizontal force limits of some stances side by side, with the same scale.
-
-    Parameters
-    ----------
-    **stances : WrenchSet
-        title=wrenches of a stance. "_" in a title is shown as a space.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot horizontal force limits of some stances side by side, with the same scale."""
     polar = {"projection": "polar"}
     figure, grid = plt.subplots(1, len(stances), figsize=(4 * len(stances), 5.0), subplot_kw=polar)
     axes = np.atleast_1d(grid)
@@ -147,22 +106,7 @@ def compass_row(**stances: WrenchSet) -> Figure:
 
 
 def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> str:
-    """Draw a robot on a slope, and the planned forces of a controller that assumes another slope.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    slope, believed : float
-        Actual and assumed slope, rising towards x [°].
-    facets : int, optional
-        Number of facets.
-
-    Returns
-    -------
-    str
-        The actual ratios of tangential to normal force, as text.
-    """
+    """Draw a robot on a slope, and the planned forces of a controller that assumes another."""
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
     contacts = fb.Contacts.points(robot, normals=slope_normal(believed))
@@ -182,26 +126,7 @@ def show_slope(view: Viewer, slope: float, believed: float, facets: int = 4) -> 
 
 
 def show_region(view: Viewer, slope: float, mu: float, facets: int = 8) -> str:
-    """Draw a robot on a slope, and from above the region in which its centre of mass may be.
-
-    The body is tilted with the slope.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    slope : float
-        Slope, rising towards x [°].
-    mu : float
-        Friction coefficient [-].
-    facets : int, optional
-        Number of facets of each friction polyhedron.
-
-    Returns
-    -------
-    str
-        The drawing from above, as SVG.
-    """
+    """Draw a robot on a slope, and from above the region in which its centre of mass may be."""
     robot, n = view.robot, slope_normal(slope)
     start = fb.Simulation(robot, fb.Ground(normal=n)).state
     contacts = fb.Contacts.points(robot, mu, normals=n)

@@ -15,13 +15,7 @@ _MAX_LISTED = 4  # constraints that a note lists
 
 
 def plot_one_foot() -> Axes:
-    """Plot a QP for the force of one foot whose optimum lies in the corner of two constraints.
-
-    Returns
-    -------
-    Axes
-        The axes, with the horizontal and the normal force [N].
-    """
+    """Plot a QP for the force of one foot whose optimum lies in the corner of two constraints."""
     goal = np.array([70.0, 85.0])  # N
     G, h = np.array([[1.0, -0.5], [-1.0, -0.5], [0.0, 1.0]]), np.array([0.0, 0.0, 60.0])
     names = ("facet, forwards", "facet, backwards", "largest normal force")

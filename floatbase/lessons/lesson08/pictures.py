@@ -39,22 +39,7 @@ _HALF_WIDTH = widgets.Layout(flex="1 1 45%", min_width="min(260px, 100%)")
 
 
 def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str) -> HTML:
-    """Draw from above the centre of mass, and where it may be while a foot is lifted.
-
-    Parameters
-    ----------
-    state : State
-        State of the robot.
-    contacts : Contacts
-        All contacts.
-    *lifted : str
-        Names of the feet to lift, one per drawing.
-
-    Returns
-    -------
-    HTML
-        The drawings side by side.
-    """
+    """Draw from above the centre of mass, and where it may be while a foot is lifted."""
     feet = contacts.positions(state)
     drawn = ""
     for foot in lifted:
@@ -65,22 +50,7 @@ def plot_support_triangles(state: fb.State, contacts: fb.Contacts, *lifted: str)
 
 
 def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -> Figure:
-    """Plot the distance of a falling centre of mass from the line between two feet, and a pendulum.
-
-    Parameters
-    ----------
-    time : array_like, shape (n,)
-        Time [s].
-    away : array_like, shape (n,)
-        Distance of the centre of mass from the line [m].
-    omega : float
-        Rate of the pendulum [1/s].
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot how far a centre of mass falls from the line between two feet, and a pendulum."""
     t, d = np.asarray(time), np.asarray(away)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     ax.plot(t, 1e3 * d, color=hex_code(GREYS[0]), linewidth=2, label="MuJoCo")
@@ -102,24 +72,7 @@ def plot_pendulum_fall(time: npt.ArrayLike, away: npt.ArrayLike, omega: float) -
 def show_shifted_loads(
     view: Viewer, state: fb.State, lifted: str, back: float, right: float
 ) -> str:
-    """Move the body while all feet stay, and show the loads of three feet at rest.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer of the picture.
-    state : State
-        State of the robot before the move.
-    lifted : str
-        Name of the foot without load.
-    back, right : float
-        Displacement of the body [mm].
-
-    Returns
-    -------
-    str
-        The loads and the distance to the edge of the support triangle.
-    """
+    """Move the body while all feet stay, and show the loads of three feet at rest."""
     moved = state_with_moved_body(state, [-back / 1000, -right / 1000, 0.0])
     stand = fb.Contacts.points(state.robot).without(lifted)
     feet = stand.positions(moved)[:, :2]
@@ -132,26 +85,7 @@ def show_shifted_loads(
 
 
 def show_foothold(view: Viewer, state: fb.State, speed: float, time: float, ahead: float) -> str:
-    """Mark where two feet land for a given step, with the capture and the neutral point.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer of the picture.
-    state : State
-        State of the robot.
-    speed : float
-        Forward velocity of the centre of mass [m/s].
-    time : float
-        Duration of the step [s].
-    ahead : float
-        Distance of the step from the centre of mass [m].
-
-    Returns
-    -------
-    str
-        The three distances.
-    """
+    """Mark where two feet land for a given step, with the capture and the neutral point."""
     contacts = fb.Contacts.points(state.robot)
     feet = dict(zip(contacts.names, contacts.positions(state)[:, :2], strict=True))
     c, middle = state.com[:2], np.mean(list(feet.values()), axis=0)
@@ -189,15 +123,7 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
 
 
 class PushComparison(widgets.VBox):
-    """Robots side by side, each with its own controller, pushed by the same sliders.
-
-    Nothing moves before the first push.
-
-    Parameters
-    ----------
-    controllers : mapping of str to callable
-        The controllers by title; each has a `robot`.
-    """
+    """Robots side by side, each with its own controller, pushed by the same sliders."""
 
     def __init__(self, controllers: Mapping[str, Any]):
         self.views = {

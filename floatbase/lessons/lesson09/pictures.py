@@ -35,24 +35,7 @@ _ZERO_TOLERANCE = 1e-9  # rounding of a constraint of length one
 
 
 def show_soles(view: Viewer, state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike) -> str:
-    """Draw planned forces at the corners of soles, and the centres of pressure from above.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    state : State
-        State of the robot.
-    contacts : Contacts
-        The soles.
-    forces : array_like, shape (k,)
-        Forces at the corners in the world frame [N].
-
-    Returns
-    -------
-    str
-        The drawing from above, as SVG.
-    """
+    """Draw planned forces at the corners of soles, and the centres of pressure from above."""
     view.draw(_feet_only(view, view.painter.picture(state, contacts, planned=forces)))
     return soles_picture(state, contacts, forces)
 
@@ -94,26 +77,7 @@ def soles_picture(state: fb.State, contacts: fb.Contacts, forces: npt.ArrayLike)
 def show_sole(
     view: Viewer, state: fb.State, sole: fb.Contacts, limits: WrenchSet, wrench: npt.ArrayLike
 ) -> str:
-    """Draw a sole with the corner forces of a wrench and their sum at the centre of pressure.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    state : State
-        State of the robot.
-    sole : Contacts
-        Contacts of one sole.
-    limits : WrenchSet
-        Possible wrenches about the origin of the sole's frame.
-    wrench : array_like, shape (6,)
-        Force and moment about that point in the world frame [N, N·m], with a positive normal force.
-
-    Returns
-    -------
-    str
-        The limits as SVG.
-    """
+    """Draw a sole with the corner forces of a wrench and their sum at the centre of pressure."""
     w = np.asarray(wrench, dtype=np.float64)
     forces = corner_forces(state, sole, w)
     picture = view.painter.picture(state, sole, planned=forces, com=False)
@@ -132,24 +96,7 @@ def show_sole(
 
 
 def play_resultants(view: Viewer, record: Rollout, speed: float, title: str) -> Viewer:
-    """Play a record with the planned force of each sole at its planned centre of pressure.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    record : Rollout
-        The record; its planned wrenches are about the origins of the soles' frames.
-    speed : float
-        Speed; 1 is real time [-].
-    title : str
-        Text in the corner.
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Play a record with the planned force of each sole at its planned centre of pressure."""
     period = record.time[1] - record.time[0]
     rows = range(0, len(record), max(1, round(speed / (_FRAME_RATE * period))))
     pictures = []
@@ -178,18 +125,7 @@ def _violated_limits(limits: WrenchSet, wrench: Array) -> str:
 
 
 def limit_kinds(rows: npt.ArrayLike) -> list[str]:
-    """Return the motion that each constraint on the wrench of a level sole prevents.
-
-    Parameters
-    ----------
-    rows : array_like, shape (n, 6)
-        Constraints on the wrench about the middle of the sole.
-
-    Returns
-    -------
-    list of str
-        "sliding", "tipping" or "twisting" for each constraint.
-    """
+    """Return the motion that each constraint on the wrench of a level sole prevents."""
     R = np.asarray(rows)
     R = R / np.abs(R).max(axis=1, keepdims=True)
     moment = np.abs(R[:, 3:5]).max(axis=1) > _ZERO_TOLERANCE
@@ -232,20 +168,7 @@ def _slice(limits: WrenchSet, wrench: Array, *lines: str) -> str:
 
 
 def plot_walk(record: Rollout, steps: Iterable[StepPlan]) -> Axes:
-    """Plot a walk from above: centre of mass, centre of pressure and the soles on the ground.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-    steps : iterable of StepPlan
-        The steps, `walk.history`.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot a walk from above: centre of mass, centre of pressure and the soles on the ground."""
     figure, axis = plt.subplots(figsize=(8.5, 3.0), layout="constrained")
     for step in steps:
         state = record.state(min(int(np.searchsorted(record.time, step.time)), len(record) - 1))

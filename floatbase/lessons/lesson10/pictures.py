@@ -24,20 +24,7 @@ _MAPS = {
 
 
 def plot_step(paths: Mapping[str, npt.ArrayLike], reach: float) -> Figure:
-    """Plot pendulums that take a step of 0.3 m after 1 s.
-
-    Parameters
-    ----------
-    paths : mapping of str to array_like, shape (n, 3)
-        Time [s], centre of mass [m] and zero-moment point [m], by the label of the pendulum.
-    reach : float
-        Half of the length of the foot [m].
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot pendulums that take a step of 0.3 m after 1 s."""
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for foot, times in ((0.0, (0.0, 1.0)), (0.3, (1.0, 2.0))):
         ax.fill_between(times, foot - reach, foot + reach, color=hex_code(GREYS[2]), alpha=0.4)
@@ -52,20 +39,7 @@ def plot_step(paths: Mapping[str, npt.ArrayLike], reach: float) -> Figure:
 
 
 def plot_loads(record: Rollout, begin: float, end: float) -> Figure:
-    """Plot the sum of the vertical forces of the ground, planned and measured.
-
-    Parameters
-    ----------
-    record : Rollout
-        The record.
-    begin, end : float
-        Part of the record [s].
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot the sum of the vertical forces of the ground, planned and measured."""
     rows = (record.time >= begin) & (record.time < end)
     figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
     for forces, grey, width, label in (
@@ -83,13 +57,7 @@ def plot_loads(record: Rollout, begin: float, end: float) -> Figure:
 
 
 def plot_push_recovery_maps() -> Figure:
-    """Plot the push-recovery maps of lessons 07, 08 and 10 together, seen from above.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot the push-recovery maps of lessons 07, 08 and 10 together, seen from above."""
     figure, ax = plt.subplots(
         figsize=(6, 6), layout="constrained", subplot_kw={"projection": "polar"}
     )

@@ -34,24 +34,7 @@ FRAME_RATE = 10  # pictures per second of the drifting feet
 
 
 def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str:
-    """Draw a puck that slides straight over a turning table and leaves a chalk line on it.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    omega : float
-        Angular velocity of the table, to the left [rad/s].
-    speed : float
-        Speed of the puck along x [m/s].
-    time : float
-        Time since the start [s].
-
-    Returns
-    -------
-    str
-        The view of a rider on the table, as SVG.
-    """
+    """Draw a puck that slides straight over a turning table and leaves a chalk line on it."""
     times = np.linspace(0.0, max(time, 1e-3), PIECES + 1)
     seen = view_from_rotating_frame(times, [0.0, 0.0, omega], START, [speed, 0.0, 0.0])
     top = np.array([0.0, 0.0, TABLE_HEIGHT])
@@ -121,25 +104,7 @@ def _arrow(start: Array, end: Array, dashes: str) -> str:
 
 
 def show_tumble(view: Viewer, glide: float, spin: float) -> str:
-    """Draw a robot in the air that moves to its left and turns, and its fictitious base force.
-
-    The force is the velocity part of h on the base, written in the base's axes (dark) and in the
-    world's (light). The force is grey, because no other body exerts it.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    glide : float
-        Velocity to the left [m/s].
-    spin : float
-        Angular velocity about the vertical [rad/s].
-
-    Returns
-    -------
-    str
-        Both forces, and the difference between the base's accelerations that follow from them.
-    """
+    """Draw a robot in the air that moves to its left and turns, and its fictitious base force."""
     robot = view.robot
     q, v = robot.standing().q.copy(), np.zeros(robot.nv)
     q[2] += 0.25
@@ -182,20 +147,7 @@ def _falling(state: fb.State, fictitious: Array, axes: str) -> Array:
 
 
 def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) -> Axes:
-    """Plot errors against speed on logarithmic axes, with the slope between the ends of each curve.
-
-    Parameters
-    ----------
-    speeds : sequence of float
-        Speeds relative to a figure of eight in 6 s [-].
-    errors : mapping of str to sequence of float
-        For each name: the error at each speed [mm].
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot errors against speed on logarithmic axes, with the mean slope of each curve."""
     _, axis = plt.subplots(figsize=(7, 3.4), layout="constrained")
     for (name, curve), colour, style in zip(
         errors.items(), GREYS, ("o-", "s--", "^:"), strict=False
@@ -218,24 +170,7 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
 
 
 def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
-    """Play a robot whose feet drift, with a pin at each foot's first position.
-
-    A line from the pin shows how far to the side the foot is now.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    record : Rollout
-        The record.
-    speed : float, optional
-        Speed; 1 is real time [-].
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Play a robot whose feet drift, with a pin at each foot's first position."""
     contacts = record.contacts
     home = contacts.positions(record.state(0))
     rows = np.arange(

@@ -32,18 +32,7 @@ RUN_DURATION = 0.4  # s: duration of the run in the panel
 
 
 def draw_cylinder(u: float) -> str:
-    """Draw a cylinder with its valve: which chamber is joined to the supply, and which to the tank.
-
-    Parameters
-    ----------
-    u : float
-        Command to the valve, from -1 to 1 [-].
-
-    Returns
-    -------
-    str
-        The drawing as SVG, and a line of text.
-    """
+    """Draw a cylinder whose valve joins one chamber to the supply and the other to the tank."""
     top, bottom, left, right, piston = 40.0, 120.0, 60.0, 420.0, 230.0
     thick = {"stroke_width": "2.5"}
     body = {"fill": "none", "stroke": "currentColor", **thick}
@@ -89,22 +78,7 @@ def draw_cylinder(u: float) -> str:
 
 
 def show_crank(view: Viewer, angle: float, torque: float) -> str:
-    """Draw the cylinder of a knee with its chambers A and B, enlarged three times.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    angle : float
-        Angle of the joint from where the lever is longest [°]; it grows as the rod moves out.
-    torque : float
-        Torque at the joint [N·m].
-
-    Returns
-    -------
-    str
-        The lever, the possible torques, and the pressures for this torque.
-    """
+    """Draw the cylinder of a knee with its chambers A and B, enlarged three times."""
     bench = Bench(lambda t: (np.deg2rad(angle), 0.0))
     gamma = np.arccos(bench.crank / bench.base) + bench.angle
     foot = JOINT + [0.0, 0.0, DRAWING_SCALE * bench.base]
@@ -157,20 +131,7 @@ def _pressures(bench: Bench, torque: float) -> tuple[float, float]:
 
 
 def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0) -> Axes:
-    """Plot torques on the bench over time, with a thin line at the desired torque.
-
-    Parameters
-    ----------
-    runs : mapping of str to sequence of BenchSample
-        The samples of each run.
-    wanted : float, optional
-        Desired torque [N·m].
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot torques on the bench over time, with a thin line at the desired torque."""
     axis = _axes("time [ms]", "torque at the joint [N·m]")
     axis.axhline(wanted, color=hex_code(GREYS[2]), linewidth=1.0)
     for i, (name, rows) in enumerate(runs.items()):
@@ -181,20 +142,7 @@ def plot_torques(runs: Mapping[str, Sequence[BenchSample]], wanted: float = 12.0
 
 
 def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
-    """Plot how far the centre of mass has moved sideways, over time from the start of each record.
-
-    Parameters
-    ----------
-    records : mapping of str to Rollout
-        The records by name.
-    side : {1.0, -1.0}, optional
-        Side that counts as positive: 1 is left, -1 is right.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot how far the centre of mass has moved sideways, since the start of each record."""
     axis = _axes("time [s]", f"CoM shift to the {'left' if side > 0 else 'right'} [mm]")
     for i, (name, record) in enumerate(records.items()):
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
@@ -205,22 +153,7 @@ def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
 
 
 def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
-    """Plot powers over time.
-
-    Parameters
-    ----------
-    watts : array_like, shape (n, k)
-        Powers [W].
-    names : sequence of str
-        The k names.
-    step : float, optional
-        Time between two values [s].
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot powers over time."""
     axis = _axes("time [s]", "power [W]")
     watts = np.asarray(watts)
     for i, name in enumerate(names):
@@ -247,24 +180,7 @@ def _add_legend(axis: Axes) -> None:
 
 
 def show_torque_step(bandwidth: float, supply: float, turning: float) -> str:
-    """Draw the response of the force loop of floatbase on the bench.
-
-    The desired torque is 12 N·m from 0 s on, and the joint turns for a while from 150 ms on.
-
-    Parameters
-    ----------
-    bandwidth : float
-        Bandwidth of the force loop [Hz].
-    supply : float
-        Supply pressure [bar].
-    turning : float
-        Angular velocity of the joint [rad/s]; the rod moves out.
-
-    Returns
-    -------
-    str
-        The drawing as SVG, and a line of text.
-    """
+    """Draw the response of the force loop of floatbase on the bench."""
     hydraulics = replace(Hydraulics(), supply_pressure=supply * BAR)
     rows = run_force_loop(
         Bench(hold_then_turn(turning), hydraulics=hydraulics), bandwidth, RUN_DURATION

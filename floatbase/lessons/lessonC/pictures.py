@@ -34,18 +34,7 @@ _STYLES = ("-", "--", ":")
 
 
 def show_table(lowest: float) -> str:
-    """Draw the table of the course text and a bowl, with the marble and the multiplier.
-
-    Parameters
-    ----------
-    lowest : float
-        Height of the bowl's lowest point above the table [m]; negative below it.
-
-    Returns
-    -------
-    str
-        The picture as HTML.
-    """
+    """Draw the table of the course text and a bowl, with the marble and the multiplier."""
     qp = table_top((0.5, lowest), (1.0, 2.0))
     solution = fb.solve(qp)
     price = float(solution.inequality_multipliers[0])
@@ -59,25 +48,7 @@ def show_table(lowest: float) -> str:
 
 
 class ActiveSetGame(widgets.VBox):
-    """Game in which you solve a QP in the plane by hand.
-
-    There is a button for each constraint, which switches it on or off, and one for the next bowl.
-    Each click solves one linear system with the constraints that are on.
-
-    Parameters
-    ----------
-    puzzles : sequence of tuple of float, optional
-        Lowest points of the bowls.
-
-    Attributes
-    ----------
-    working : tuple of str
-        Names of the constraints that are on.
-    clicks : int
-        Number of clicks.
-    solved : bool
-        Whether the present point is the optimum.
-    """
+    """Game in which you solve a QP in the plane by hand."""
 
     def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
         self._puzzles, self._at = tuple(puzzles), 0
@@ -200,22 +171,7 @@ def plot_problem(qp: QP, start: npt.ArrayLike) -> Axes:
 
 
 def show_solver_path(qp: QP, ways: Sequence[tuple[Array, Sequence[int]]], rounds: float) -> str:
-    """Draw the path of a solver in the plane after some iterations.
-
-    Parameters
-    ----------
-    qp : QP
-        The problem.
-    ways : sequence of tuple
-        For each iteration, starting with none: the point, shape (2,), and the working set.
-    rounds : float
-        Number of iterations; between integers, the point is on the way.
-
-    Returns
-    -------
-    str
-        The picture, the working set and the objective, as HTML.
-    """
+    """Draw the path of a solver in the plane after some iterations."""
     whole = min(int(rounds), len(ways) - 1)
     x, W = ways[whole]
     if rounds > whole:

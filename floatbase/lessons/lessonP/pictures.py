@@ -13,20 +13,7 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 
 
 def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> Axes:
-    """Plot outcomes as a table: dark squares where a robot fell, with the time of the fall.
-
-    Parameters
-    ----------
-    records : mapping of tuple to Rollout
-        Records by (assumed value, actual value).
-    name : str
-        Name of the value.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot outcomes as a table: dark squares where a robot fell, with the time of the fall."""
     assumed, actual = (sorted({pair[i] for pair in records}) for i in (0, 1))
     _, axis = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
     fell = np.array([[records[b, t].outcome != "completed" for t in actual] for b in assumed])
@@ -42,22 +29,7 @@ def plot_outcomes(records: Mapping[tuple[float, float], Rollout], name: str) -> 
 
 
 def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) -> Axes:
-    """Plot how far a push moves a robot for some gains; crosses at the top are falls.
-
-    Parameters
-    ----------
-    gains : sequence of float
-        The gains kp [1/s²].
-    moved : sequence of float
-        Displacement for each gain [mm]; not finite for a fall.
-    border : float
-        Gain that is marked with a dashed line [1/s²].
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot how far a push moves a robot for some gains; crosses at the top are falls."""
     _, axis = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
     stands = np.isfinite(y)

@@ -23,24 +23,7 @@ _MIN_TOLERANCE = 1.0  # N: smaller forces are shown as zero
 
 
 def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None = None) -> Viewer:
-    """Play a box with measured and planned forces, and with the cones that the controller assumed.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    box : BlackBox
-        The record.
-    speed : float, optional
-        Speed; 1 is real time [-].
-    title : str, optional
-        Text in the corner.
-
-    Returns
-    -------
-    Viewer
-        The viewer.
-    """
+    """Play a box with measured and planned forces, and with the controller's assumed cones."""
     places = np.array([box.contacts.positions(box.state(i)) for i in range(len(box))])
     record = Rollout(
         box.robot, box.contacts, box.time, box.q, box.v, np.full_like(box.tau, np.nan), box.tau,
@@ -51,24 +34,7 @@ def play_box(view: Viewer, box: BlackBox, speed: float = 0.25, title: str | None
 
 
 def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str:
-    """Draw one row of a box.
-
-    Parameters
-    ----------
-    view : Viewer
-        Viewer to draw on.
-    box : BlackBox
-        The record.
-    missed : ndarray, shape (n - 1, nv)
-        Result of `required_forces`.
-    time : float
-        Time of the row [s].
-
-    Returns
-    -------
-    str
-        Planned and measured forces, and what is missing in (7), as text.
-    """
+    """Draw one row of a box."""
     i = int(np.clip(np.searchsorted(box.time, time), 0, len(missed) - 1))
     view.show(box.state(i), box.contacts, box.measured[i], box.planned[i], com=False)
     gaps = np.linalg.norm((box.measured[i] - box.planned[i]).reshape(-1, 3), axis=1)
@@ -83,20 +49,7 @@ def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str
 
 
 def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
-    """Plot the force on the base that is missing in (7), with the weight for comparison.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-    missed : array_like, shape (n - 1, nv)
-        Result of `required_forces`.
-
-    Returns
-    -------
-    Figure
-        The figure.
-    """
+    """Plot the force on the base that is missing in (7), with the weight for comparison."""
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
     ax.axhline(box.robot.weight, color=hex_code(GREYS[1]), linestyle="--", label="weight")
@@ -109,24 +62,7 @@ def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
 
 
 def draw_torque_comparison(box: BlackBox, got: Array, joint: int, ms: float) -> str:
-    """Draw the required torque of a joint and the command after a first-order lag.
-
-    Parameters
-    ----------
-    box : BlackBox
-        The record.
-    got : ndarray, shape (n - 1, d)
-        Torques that the motion required [N·m].
-    joint : int
-        Index of the joint.
-    ms : float
-        Time constant of the lag [ms].
-
-    Returns
-    -------
-    str
-        The drawing and how well the torques agree, as HTML.
-    """
+    """Draw the required torque of a joint and the command after a first-order lag."""
     times, period = box.time[: len(got)], float(box.time[1] - box.time[0])
     commanded = box.tau[: len(got)]
     orders = lagged(commanded, period, ms)

@@ -55,10 +55,7 @@ def notebook_page() -> str:
 
 
 def robot_page(robots: tuple[str, ...], settings: dict[str, Any]) -> str:
-    """Return the page with a live robot. It loads its other files from its own folder.
-
-    settings: names, units and ranges of its controls.
-    """
+    """Return the page with a live robot. It loads its other files from its own folder."""
     scripts = '<script src="meshcat.js"></script><script src="robot.js"></script>'
     page = _page("robot", scripts, "live robot", {"robots": robots, "settings": settings})
     return page.replace("<body>", '<body class="robot">')
