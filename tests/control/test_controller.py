@@ -49,7 +49,10 @@ def test_daqp_finds_the_optimum_that_cvxpy_finds(name, n):
         for solution in (found, judge):
             r = solution.residuals
             assert r.equality < 1e-9 and r.dual == 0.0
-            assert max(r.inequality, r.stationarity, r.complementarity) < 1e-6
+            assert max(r.inequality, r.stationarity) < 1e-6
+            # Clarabel's gap is relative to the objective
+            gap = 1e-8 * abs(judge.objective) if solution is judge else 0.0
+            assert r.complementarity < max(1e-6, gap)
     assert n_active > n / 4 or not judges.load(name).is_floating, (
         "no row was active: these states try nothing"
     )
