@@ -423,8 +423,9 @@ class Cylinders(Value):
         self, flows: Array, pressures: Array, geometry: CylinderGeometry, v: Array
     ) -> Array:
         """Return the rates of change of the pressures for flows from the valve [Pa/s]."""
-        inflow = flows - self.leakage_flow(pressures) - self._signed_areas * (geometry.lever * v)
-        return inflow / geometry.compliance
+        moved = self._signed_areas * (geometry.lever * v)  # m³/s, by the piston
+        rates: Array = (flows - self.leakage_flow(pressures) - moved) / geometry.compliance
+        return rates
 
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
         """Return the decay rate -∂ṗ/∂p of each chamber's own pressure.
