@@ -454,7 +454,8 @@ class Cylinders(Value):
     ) -> Array:
         """Return the decay rates for openings without their signs and pressure drops [1/s]."""
         slope = self._valve_gain * (0.5 * drop**2 + _LAMINAR_DROP**2) / smooth_drop**2.5
-        return (opening * slope + self._leakage) / geometry.compliance
+        rates: Array = (opening * slope + self._leakage) / geometry.compliance
+        return rates
 
     def advance(
         self,
