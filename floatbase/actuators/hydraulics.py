@@ -423,8 +423,9 @@ class Cylinders(Value):
         self, flows: Array, pressures: Array, geometry: CylinderGeometry, v: Array
     ) -> Array:
         """Return the rates of change of the pressures for flows from the valve [Pa/s]."""
-        inflow = flows - self.leakage_flow(pressures) - self._signed_areas * (geometry.lever * v)
-        return inflow / geometry.compliance
+        moved = self._signed_areas * (geometry.lever * v)  # m³/s, by the piston
+        rates: Array = (flows - self.leakage_flow(pressures) - moved) / geometry.compliance
+        return rates
 
     def pressure_decay(self, x: Array, pressures: Array, geometry: CylinderGeometry) -> Array:
         """Return the decay rate -∂ṗ/∂p of each chamber's own pressure.
@@ -453,7 +454,8 @@ class Cylinders(Value):
     ) -> Array:
         """Return the decay rates for openings without their signs and pressure drops [1/s]."""
         slope = self._valve_gain * (0.5 * drop**2 + _LAMINAR_DROP**2) / smooth_drop**2.5
-        return (opening * slope + self._leakage) / geometry.compliance
+        rates: Array = (opening * slope + self._leakage) / geometry.compliance
+        return rates
 
     def advance(
         self,
