@@ -49,7 +49,7 @@ Q_GOAL[2] += RADIUS - min(data.oMf[model.getFrameId(foot)].translation[2] for fo
 # and h holds gravity, Coriolis and centrifugal forces. For any q̈, (1) gives the torques that
 # produce it. A floating base adds six equations without motors, so S has zeros in six rows, (3).
 # Contact forces take the place of the bolts. They enter through the Jacobian J of the contact
-# points, (4). A foot may roll but not slip: its lowest material point has the velocity J v = 0.
+# points, (4). A foot may roll but not slip: at its lowest point, the ball's velocity J v is zero.
 # Differentiating gives J q̈ + J̇ v = 0, which is linear in q̈, (5), (6). In all:
 #
 #     M q̈ + h = S τ + Jᵀ λ
@@ -117,11 +117,11 @@ def motion_system(eom):
     return np.block([[M, -S, -J.T], [J, np.zeros((k, d + k))]]), np.concatenate([-h, b])
 
 
-def all_solutions(A, a):
-    """Return V and x₀ such that the solutions of A x = a are V β + x₀, as in (13)."""
-    U, sigma, Vt = np.linalg.svd(A)
+def all_solutions(B, r):
+    """Return V and x₀ such that the solutions of B x = r are V β + x₀, as in (13)."""
+    U, sigma, Vt = np.linalg.svd(B)
     rank = np.sum(sigma > 1e-10 * sigma[0])
-    x0 = Vt[:rank].T @ ((U.T @ a)[:rank] / sigma[:rank])  # the pseudo-inverse of A times a
+    x0 = Vt[:rank].T @ ((U.T @ r)[:rank] / sigma[:rank])  # the pseudo-inverse of B times r
     return Vt[rank:].T, x0
 
 
@@ -180,9 +180,9 @@ def friction_pyramid():
 #     subject to (7), forces in their pyramids, and torques within the limits                   (27)
 #
 # The goal is to stand. For each error, the desired acceleration is that of a spring and a damper.
-# Centre of mass and orientation use all six accelerations that four standing feet leave. The joint
-# angles have a small weight: they count if limits prevent the others. The cost on τ and λ chooses
-# one of the many λ with the same q̈. We solve for 42 entries of x; section 9 for 12 entries of β.
+# Centre of mass and orientation use all 18 - 12 accelerations that four standing feet leave. The
+# joint angles have a small weight: they count if limits prevent the others. The cost on τ and λ
+# chooses one of many λ with the same q̈. We solve for 42 entries of x; section 9 for the 12 of β.
 
 COM_GOAL = centre_of_mass(Q_GOAL, np.zeros(nv))[0]
 KP, KD = 100.0, 20.0  # stiffness [1/s²] and damping [1/s]; 2 √KP is critical damping
