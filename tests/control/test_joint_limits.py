@@ -98,9 +98,8 @@ def test_both_backends_agree_near_limits(name, weight):
             command, expected = (each(state.q, state.v) for each in (compiled, reference))
         except InfeasibleError:
             continue
-        joints = [
-            row for row in command.active if row.kind.endswith(("position limit", "city limit"))
-        ]
+        kinds = ("position limit", "velocity limit")
+        joints = [row for row in command.active if row.kind.endswith(kinds)]
         n_active += bool(joints)
         assert command.violations == pytest.approx(expected.violations, rel=1e-4, abs=1e-6)
         assert set(command.violations) <= set(joints)
@@ -237,12 +236,10 @@ def test_active_limits_are_named_for_joint_kind_and_side():
         target = np.array(configuration)
         target[7 + joint] += 1.0
         task = fb.PostureTask(target, kp=900.0, kd=0.0)
-        controller = fb.WholeBodyController(
-            robot, free, [task], joint_limits=replace(limits, **changes)
-        )
-        row = next(
-            r for r in controller(configuration, speeds).active if r.owner == "FL_calf_joint"
-        )
+        changed = replace(limits, **changes)
+        controller = fb.WholeBodyController(robot, free, [task], joint_limits=changed)
+        active = controller(configuration, speeds).active
+        row = next(row for row in active if row.owner == "FL_calf_joint")
         assert row == f"FL_calf_joint {kind} upper" and row.kind == f"upper {kind} limit"
 
 
@@ -260,16 +257,11 @@ def test_impossible_soft_constraints_are_violated_and_named(backend):
     rise = LinearInequality("rise", "qdd", (-np.eye(robot.nv)[2:3], [-200.0]))
     squeeze = {"min_normal_force": 60.0, "max_normal_force": 40.0}
     options = {"inequalities": [rise], "backend": backend, **squeeze}
-    tasks = fb.standing_tasks(standing)
-    hard = fb.WholeBodyController(
-        robot, judges.stance(robot), tasks, joint_limits=JointLimits.of(robot, weight=None),
-        **options,
-    )  # fmt: skip
+    limits = JointLimits.of(robot, weight=None)
+    hard = judges.controller_of("go2", joint_limits=limits, **options)
     with pytest.raises(InfeasibleError):
         hard(q, standing.v)
-    soft = fb.WholeBodyController(
-        robot, judges.stance(robot), tasks, on_infeasible="soften", **options
-    )
+    soft = judges.controller_of("go2", on_infeasible="soften", **options)
     command = soft(q, standing.v)
     assert command.softened and "rise" in command.violations
     for foot in soft.contacts.names:  # at most 40 N and at least 60 N
@@ -288,10 +280,8 @@ def test_a_soft_force_bound_holds_while_it_can():
     robot = judges.load("go2")
     standing, contacts = robot.standing(), judges.stance(robot)
     bounds = {"FL_foot": lambda t: 10.0 + 500.0 * t}
-    for controller in judges.pair(
-        robot, contacts, max_normal_force={"FR_foot": 5.0}, min_normal_force=bounds,
-        normal_force_weight=1e3,
-    ):  # fmt: skip
+    options = {"max_normal_force": {"FR_foot": 5.0}, "min_normal_force": bounds}
+    for controller in judges.pair(robot, contacts, normal_force_weight=1e3, **options):
         for t, holds in ((0.0, True), (1.0, False)):
             command = controller(standing.q, standing.v, t)
             force = command.force("FL_foot")[2]
@@ -310,9 +300,8 @@ def test_limits_are_the_robots_by_default_and_can_be_off():
     assert "upper position limit" in kinds
     off = judges.controller_of("go2", joint_limits=None)
     assert off.limits.joint_limits is None
-    assert not {name.kind for name in off.qp(robot.standing()).inequality_names} & {
-        "upper position limit", "lower velocity limit"
-    }  # fmt: skip
+    kinds = {name.kind for name in off.qp(robot.standing()).inequality_names}
+    assert not kinds & {"upper position limit", "lower velocity limit"}
 
 
 def test_braking_follows_the_torque_limits_of_the_controller():

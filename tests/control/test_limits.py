@@ -48,9 +48,7 @@ def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(na
     robot = judges.load(name)
     contacts = judges.stance(robot)
     inequalities = user_inequalities(robot, contacts)
-    compiled, reference = judges.pair(
-        robot, contacts, list(fb.standing_tasks(robot.standing())), inequalities=inequalities
-    )
+    compiled, reference = judges.pair(robot, contacts, inequalities=inequalities)
     kinds: set[str] = set()
     for i, state in enumerate(judges.near_and_far(name, 6)):
         t = 0.1 * i
@@ -72,12 +70,8 @@ def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(na
 def test_user_defined_inequalities_against_cvxpy():
     robot = judges.load("go2")
     contacts = judges.stance(robot)
-    controller = judges.pair(
-        robot,
-        contacts,
-        list(fb.standing_tasks(robot.standing())),
-        inequalities=user_inequalities(robot, contacts),
-    )[0]
+    rows = user_inequalities(robot, contacts)
+    controller = judges.controller_of("go2", inequalities=rows, backend="compiled")
     for state in judges.states("go2", 4, 0.1):
         command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
         assert command.backend == "compiled"
@@ -87,16 +81,14 @@ def test_user_defined_inequalities_against_cvxpy():
 def test_conflicting_inequalities_are_reported_by_name():
     robot = judges.load("go2")
     light = LinearInequality("light feet", "forces", (np.tile([0.0, 0.0, 1.0], (1, 4)), [0.0]))
-    for controller in judges.pair(
-        robot, judges.stance(robot), [], inequalities=[light], min_normal_force=10.0
-    ):
+    options = {"inequalities": [light], "min_normal_force": 10.0}
+    for controller in judges.pair(robot, judges.stance(robot), [], **options):
         with raises(InfeasibleError, "light feet") as caught:
             controller(robot.standing().q, np.zeros(18))
-        row = next(row for row in caught.value.constraints if row == "light feet")
+        conflict = caught.value.constraints
+        row = next(row for row in conflict if row == "light feet")
         assert (row.kind, row.owner, row.number) == ("inequality", "light feet", 0)
-        assert judges.is_smallest_conflict(
-            controller.qp(robot.standing()), caught.value.constraints
-        )
+        assert judges.is_smallest_conflict(controller.qp(robot.standing()), conflict)
 
 
 # forces over time ---------------------------------------------------------------------------------
@@ -110,7 +102,7 @@ def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time():
         "max_normal_force": {"FL_foot": lambda t: share * (1.0 - t), "RR_foot": 2.0 * share},
     }
     contacts = judges.stance(robot)
-    both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    both = judges.pair(robot, contacts, **windows)
     for t in (0.0, 0.25, 0.5, 1.0):
         command = both[0](robot.standing().q, np.zeros(18), t)
         normal = dict(zip(contacts.point_names, command.forces.reshape(-1, 3)[:, 2], strict=True))
@@ -118,9 +110,8 @@ def test_a_foot_is_unloaded_by_a_bound_that_falls_with_time():
         assert normal["RL_foot"] >= 5.0 * t - 1e-6
         assert t == 0.0 or "FL_foot largest normal force" in command.active
         assert command.active == both[1](robot.standing().q, np.zeros(18), t).active
-        assert judges.largest_difference(both, judges.near_and_far("go2", 3), t) < judges.agreement(
-            robot
-        )
+        gap = judges.largest_difference(both, judges.near_and_far("go2", 3), t)
+        assert gap < judges.agreement(robot)
     row = next(row for row in command.active if row.endswith("largest normal force"))
     assert (row.kind, row.owner) == ("largest normal force", "FL_foot")
 
@@ -129,12 +120,11 @@ def test_bounds_of_normal_forces_on_flat_feet_are_those_of_their_corners():
     robot = judges.load("talos")
     contacts = fb.Contacts.flat_feet(robot)
     windows = {"min_normal_force": {contacts.names[0]: 40.0}, "max_normal_force": 150.0}
-    both = judges.pair(robot, contacts, list(fb.standing_tasks(robot.standing())), **windows)
+    both = judges.pair(robot, contacts, **windows)
     normal = both[0](robot.standing().q, np.zeros(robot.nv)).forces[2::3]
     assert np.all(normal[:4] >= 40.0 - 1e-6) and np.all(normal <= 150.0 + 1e-6)
-    assert judges.largest_difference(both, judges.near_and_far("talos", 3)) < judges.agreement(
-        robot
-    )
+    gap = judges.largest_difference(both, judges.near_and_far("talos", 3))
+    assert gap < judges.agreement(robot)
 
 
 class Heel(PointContact):
@@ -148,15 +138,13 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend):
     robot = judges.load("go2")
     state = robot.standing()  # each foot carries more than the bound of 20 N
     tasks = list(fb.standing_tasks(state))
-    stand = fb.Contacts.points(robot).without("RL_foot") + fb.Contacts(
-        [Heel("RL_foot", radius=0.022)]
-    )
+    heel = fb.Contacts([Heel("RL_foot", radius=0.022)])
+    stand = fb.Contacts.points(robot).without("RL_foot") + heel
     swing = stand.without("FL_foot", "heel")
 
     def torques(contacts: fb.Contacts, **bounds: object) -> np.ndarray:
-        return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **bounds)(
-            state.q, state.v, 0.1
-        ).tau
+        made = fb.WholeBodyController(robot, contacts, tasks, backend=backend, **bounds)
+        return made(state.q, state.v, 0.1).tau
 
     bounds = {
         "min_normal_force": {"heel": 15.0, "RR_foot": 12.0},
@@ -165,11 +153,10 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend):
     standing = fb.WholeBodyController(robot, stand, tasks, backend=backend, **bounds)
     lifted = standing.replace(contacts=swing)
     other = lifted.replace(limits=replace(lifted.limits, torque_limits=robot.torque_limits))
+    alone = torques(swing, min_normal_force={"RR_foot": 12.0})
     for each in (lifted, other):
         assert each.backend == backend
-        assert np.array_equal(
-            each(state.q, state.v, 0.1).tau, torques(swing, min_normal_force={"RR_foot": 12.0})
-        )
+        assert np.array_equal(each(state.q, state.v, 0.1).tau, alone)
         back = each.replace(contacts=stand)(state.q, state.v, 0.1)
         assert np.array_equal(back.tau, standing(state.q, state.v, 0.1).tau)
         assert "FL_foot largest normal force" in back.active
@@ -182,14 +169,11 @@ def test_a_foot_that_lifts_keeps_its_bound_for_when_it_stands_again(backend):
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_time_varying_bound_is_evaluated_once_at_a_time(backend):
-    robot = judges.load("go2")
-    asked: list[float] = []
+    asked = []
     bound = {"FL_foot": lambda t: asked.append(t) or 50.0}
-    controller = fb.WholeBodyController(
-        robot, judges.stance(robot), [], max_normal_force=bound, backend=backend
-    )
+    controller = judges.controller_of("go2", max_normal_force=bound, backend=backend)
     assert asked == [0.0]
-    controller(robot.standing().q, np.zeros(18), 0.5)
+    controller(judges.load("go2").standing().q, np.zeros(18), 0.5)
     assert asked == [0.0, 0.5]
     controller.replace(limits=controller.limits)
     assert asked == [0.0, 0.5, 0.0]
@@ -209,13 +193,9 @@ def test_a_bound_that_goes_wrong_is_reported_on_both_backends():
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_replaced_controller_is_checked(backend):
     controller = judges.controller_of("go2", backend=backend)
+    short = LinearInequality("r", "tau", (np.eye(3), np.ones(3)))
     with raises(InputError, "r", "tau", 3, 12):
-        controller.replace(
-            limits=replace(
-                controller.limits,
-                inequalities=[LinearInequality("r", "tau", (np.eye(3), np.ones(3)))],
-            )
-        )
+        controller.replace(limits=replace(controller.limits, inequalities=[short]))
     with raises(UnknownNameError, "max_normal_force", "FL_fot", "FL_foot"):
         controller.replace(limits=replace(controller.limits, max_normal_force={"FL_fot": 1.0}))
     with raises(InputError, "q", "arm", 5):

@@ -45,9 +45,7 @@ def controller(*tasks: object, **options: object) -> fb.WholeBodyController:
     return fb.WholeBodyController(GO2, CONTACTS, tasks, **options)
 
 
-def rows(
-    block: str, n: int, m: int | None = None, owners: tuple[str, ...] = ()
-) -> LinearInequality:
+def rows(block, n, m=None, owners=()):
     return LinearInequality("r", block, (np.eye(n), np.ones(m or n)), owners)
 
 
@@ -189,13 +187,9 @@ def test_the_error_of_a_trajectory_that_begins_later_mentions_time_zero():
             raise ArithmeticError(f"nothing at {t}")
         return STATE.com
 
-    made = (
-        lambda: controller(fb.CoMTask(later)),
-        lambda: controller().replace(tasks=[fb.CoMTask(later)]),
-    )
-    for make in made:
+    for make in (lambda tasks: controller(*tasks), lambda tasks: controller().replace(tasks=tasks)):
         with raises(ArithmeticError, 0) as raised:
-            make()
+            make([fb.CoMTask(later)])
         assert any(not missing(note, "t", 0) for note in raised.value.__notes__)
 
 

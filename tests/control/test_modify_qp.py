@@ -21,12 +21,8 @@ def with_even_knees(qp: QP, eom: fb.EquationsOfMotion) -> QP:
     first, second = (eom.robot.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR"))
     row = np.zeros((1, qp.n))
     row[0, qp.blocks["tau"]][[first, second]] = 1.0, -1.0
-    return replace(
-        qp,
-        A=np.vstack([qp.A, row]),
-        b=np.append(qp.b, 0.0),
-        equality_names=(*qp.equality_names, "even knees"),
-    )
+    A, b, names = np.vstack([qp.A, row]), np.append(qp.b, 0.0), (*qp.equality_names, "even knees")
+    return replace(qp, A=A, b=b, equality_names=names)
 
 
 def unchanged(qp: QP, eom: fb.EquationsOfMotion) -> QP:
@@ -34,9 +30,7 @@ def unchanged(qp: QP, eom: fb.EquationsOfMotion) -> QP:
 
 
 def controller(**options: object) -> fb.WholeBodyController:
-    return fb.WholeBodyController(
-        GO2, judges.stance(GO2), fb.standing_tasks(GO2.standing()), **options
-    )
+    return judges.controller_of("go2", **options)
 
 
 def test_it_changes_the_problem_that_is_solved_and_no_other_is():

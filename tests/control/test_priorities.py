@@ -34,9 +34,8 @@ def test_without_inequalities_levels_are_null_space_projections():
             [fb.FrameTask(frame, rng.normal(size=3), kp=10.0)],
             [fb.PostureTask(robot.standing().q, kp=10.0), fb.TorqueTask(weight=1e-9)],
         ]
-        controller = fb.WholeBodyController(
-            robot, fb.Contacts.none(), tasks, torque_limits=np.inf, joint_limits=None
-        )
+        free = {"torque_limits": np.inf, "joint_limits": None}
+        controller = fb.WholeBodyController(robot, fb.Contacts.none(), tasks, **free)
         eom = fb.equations_of_motion(state, fb.Contacts.none())
         qdd, N = np.zeros(6), np.eye(6)
         for level in tasks:
@@ -54,9 +53,8 @@ def test_each_level_is_optimal_among_the_optima_of_the_levels_before(name):
     limits = JointLimits.of(robot, weight=None)
     levels = levels_of(robot, standing)
     controller = fb.WholeBodyController(robot, contacts, levels, joint_limits=limits)
-    weighted = fb.WholeBodyController(
-        robot, contacts, [task for level in levels for task in level], joint_limits=limits
-    )
+    tasks = [task for level in levels for task in level]
+    weighted = fb.WholeBodyController(robot, contacts, tasks, joint_limits=limits)
     solved, active = 0, 0
     for state in judges.states(name, 3, 0.05):
         qp, eom = weighted.qp(state), fb.equations_of_motion(state, contacts)
@@ -132,9 +130,8 @@ def test_levels_are_answered_by_the_reference_backend():
 def test_levels_with_soft_contacts_and_soft_limits():
     robot = judges.load("go2")
     contacts, state = judges.stance(robot), robot.standing()
-    controller = fb.WholeBodyController(
-        robot, contacts, levels_of(robot, state), min_normal_force=500.0, on_infeasible="soften"
-    )
+    levels, options = levels_of(robot, state), {"on_infeasible": "soften"}
+    controller = fb.WholeBodyController(robot, contacts, levels, min_normal_force=500.0, **options)
     command = controller(state.q, state.v)
     assert command.softened and command.violations
     soft = fb.WholeBodyController(robot, contacts, levels_of(robot, state), contact_weight=1e4)
@@ -149,9 +146,8 @@ def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(name, m
     """A hundred times larger tolerance of rounding used to move torques by 1e-5 N·m."""
     robot = judges.load(name)
     limits = JointLimits.of(robot, weight=None)
-    controller = fb.WholeBodyController(
-        robot, judges.stance(robot), levels_of(robot, robot.standing()), joint_limits=limits
-    )
+    tasks = levels_of(robot, robot.standing())
+    controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, joint_limits=limits)
     for state in judges.states(name, 2, 0.05):
         levels = controller.problem.solve_levels(state)
         with monkeypatch.context() as patch:

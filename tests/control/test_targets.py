@@ -79,9 +79,7 @@ def infeasible(**options: object) -> tuple[fb.WholeBodyController, fb.State]:
     """Return talos with weak motors, and a state in which no forces hold its feet."""
     state = TALOS.standing()
     weak = {"torque_limits": 0.2 * TALOS.torque_limits, "min_normal_force": 200.0}
-    controller = fb.WholeBodyController(
-        TALOS, judges.stance(TALOS), fb.standing_tasks(state), **weak, **options
-    )
+    controller = judges.controller_of("talos", **weak, **options)
     v = np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(TALOS.nv - 4)]
     return controller, state.replace(v=v)
 

@@ -58,9 +58,8 @@ class Pad:
 
 
 def test_user_defined_contacts_are_selected_by_name():
-    contacts = fb.Contacts(
-        [Pad("FL_foot", np.array([0.0, 0.0, 1.0])), Pad("FR_foot", np.array([0.0, 0.0, 1.0]))]
-    )
+    pads = [Pad(foot, np.array([0.0, 0.0, 1.0])) for foot in ("FL_foot", "FR_foot")]
+    contacts = fb.Contacts(pads)
     assert contacts.force_slice("FR_foot") == slice(3, 6)
     assert contacts.only("FR_foot").names == contacts.without("FL_foot").names == ("FR_foot",)
     state = judges.load("go2").standing()
@@ -72,9 +71,8 @@ def test_user_defined_contacts_are_selected_by_name():
 def test_contact_points_are_where_the_physics_has_them_for_any_normal(name):
     robot = judges.load(name)
     for seed, state in enumerate(judges.states(name, 3)):
-        normal = (
-            judges.random_normals(1, seed)[0] if name in judges.BALLS else np.array([0.0, 0.0, 1.0])
-        )
+        leaning, level = judges.random_normals(1, seed)[0], np.array([0.0, 0.0, 1.0])
+        normal = leaning if name in judges.BALLS else level
         sim = fb.Simulation(robot, Ground(normal=normal))
         if name in judges.FLAT:
             # corners are balls' lowest points, so only level soles can be compared
@@ -125,10 +123,7 @@ def test_corner_forces_make_the_wrench_of_their_generators(name):
         for contact in judges.stance(state.robot):
             forces = rng.normal(size=(len(contact.corners), 3))
             origin = state.point(contact.frame)
-            moment = sum(
-                np.cross(p - origin, f)
-                for p, f in zip(contact.positions(state), forces, strict=True)
-            )
+            moment = np.cross(contact.positions(state) - origin, forces).sum(axis=0)
             wrench = contact.force_generator_matrix(state) @ forces.ravel()
             assert np.allclose(wrench, np.concatenate([forces.sum(axis=0), moment]), atol=1e-12)
             A, _ = contact.constraint(state)
@@ -141,7 +136,6 @@ def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name):
         for contact in judges.stance(state.robot):
             assert isinstance(contact, FlatFootContact)
             A, b = contact.constraint(state)
-            assert isinstance(contact, FlatFootContact)
             assert contact.k == 3 * len(contact.corners) > 6
             assert A.shape == (6, state.robot.nv)
             assert b.shape == (6,)
@@ -209,9 +203,8 @@ def test_normals_can_be_one_for_all_one_for_each_or_by_name():
 def test_friction_is_that_of_each_contact_at_each_of_its_points():
     talos = judges.load("talos")
     left, right = (foot.frame for foot in talos.feet)
-    mixed = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left]) + fb.Contacts.points(
-        talos, mu=0.9, frames=[right]
-    )
+    sole = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left])
+    mixed = sole + fb.Contacts.points(talos, mu=0.9, frames=[right])
     assert np.array_equal(mixed.mus, [0.4, 0.4, 0.4, 0.4, 0.9])
     assert mixed.point_names == (*(f"{left} corner {i}" for i in range(4)), right)
     assert mixed.k == 15
@@ -245,12 +238,8 @@ def test_no_contacts_give_empty_rows():
 def test_each_foot_may_have_its_own_friction():
     robot, mu = judges.load("go2"), (0.3, 0.4, 0.5, 0.6)
     assert np.array_equal(fb.Contacts.points(robot, mu=mu).mus, [0.3, 0.4, 0.5, 0.6])
-    assert np.array_equal(
-        fb.Contacts.points(robot, mu, frames=list(reversed(judges.stance(robot).names)))[
-            "RR_foot"
-        ].mu,
-        0.3,
-    )
+    turned = fb.Contacts.points(robot, mu, frames=judges.stance(robot).names[::-1])
+    assert turned["RR_foot"].mu == 0.3
     assert np.array_equal(fb.Contacts.points(robot, mu={"RL_foot": 0.2}).mus, [0.7, 0.7, 0.2, 0.7])
     talos = judges.load("talos")
     assert np.array_equal(fb.Contacts.flat_feet(talos, mu=mu[:2]).mus, [0.3] * 4 + [0.4] * 4)
@@ -274,14 +263,11 @@ def test_feet_are_taken_as_they_are_flat_or_round():
         robot = judges.load(name)
         contacts = fb.Contacts.feet(robot, mu=0.4)
         assert contacts.names == tuple(foot.frame for foot in robot.feet)
-        assert [contact.k for contact in contacts] == [
-            12 if foot.is_flat else 3 for foot in robot.feet
-        ]
+        numbers = [12 if foot.is_flat else 3 for foot in robot.feet]
+        assert [contact.k for contact in contacts] == numbers
         assert np.all(contacts.mus == 0.4)
-    mixed = fb.load(
-        "go2",
-        feet=[Foot("FL_foot", 0.02), Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])],
-    )
+    plate = Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])
+    mixed = fb.load("go2", feet=[Foot("FL_foot", 0.02), plate])
     assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
     talos = fb.load("talos")
     mixed = fb.Contacts.feet(talos, mu={"left_sole_link": 0.3})

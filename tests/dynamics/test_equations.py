@@ -104,11 +104,9 @@ def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name):
     Jᵀ.
     """
     state = judges.states(name, 1)[0]
-    contacts = (
-        judges.stance(state.robot)
-        if state.robot.is_floating
-        else fb.Contacts.points(state.robot, frames=["tool0"])
-    )
+    contacts = judges.stance(state.robot)
+    if not state.robot.is_floating:
+        contacts = fb.Contacts.points(state.robot, frames=["tool0"])
     eom = fb.equations_of_motion(state, contacts)
     rest = judges.aba(eom, np.zeros(eom.d), np.zeros(eom.k))
     columns = [eom.A @ (judges.aba(eom, np.zeros(eom.d), unit) - rest) for unit in np.eye(eom.k)]

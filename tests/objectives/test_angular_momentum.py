@@ -31,18 +31,12 @@ def test_the_residual_is_the_rate_of_the_angular_momentum_less_the_desired_one(n
         rng = np.random.default_rng(seed)
         eom = fb.equations_of_motion(state, judges.stance(state.robot))
         qdd, (target, rate) = rng.normal(size=eom.nv), rng.normal(size=(2, 3))
-        after, before = (
-            angular_momentum(judges.moved(state, qdd, t).replace(v=state.v + t * qdd))
-            for t in (STEP, -STEP)
-        )
-        actual = (after - before) / (2.0 * STEP)
+        speeds = [(judges.moved(state, qdd, t), state.v + t * qdd) for t in (STEP, -STEP)]
+        after, before = (angular_momentum(there.replace(v=v)) for there, v in speeds)
         desired = rate - 3.0 * (angular_momentum(state) - target)
-        expected = actual - desired
-        for task in (
-            AngularMomentumTask(target, rate, kd=3.0),
-            AngularMomentumTask(lambda t, both=(target, rate): both, kd=3.0),
-        ):
-            found = task.residual(eom)(qdd)
+        expected = (after - before) / (2.0 * STEP) - desired
+        for given in ((target, rate), (lambda t, both=(target, rate): both,)):
+            found = AngularMomentumTask(*given, kd=3.0).residual(eom)(qdd)
             assert np.max(np.abs(found - expected)) < 1e-5 * (1.0 + np.max(np.abs(expected)))
 
 

@@ -17,13 +17,8 @@ from floatbase.affine import Quadratic
 from floatbase.dynamics import fixed_frame
 from floatbase.errors import InputError
 
-TIGHT = {
-    "solver": cp.CLARABEL,
-    "tol_gap_abs": 1e-10,
-    "tol_gap_rel": 1e-10,
-    "tol_feas": 1e-10,
-    "max_iter": 200,
-}
+TIGHT = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), 1e-10)
+TIGHT |= {"solver": cp.CLARABEL, "max_iter": 200}
 LEAN = judges.random_normals(4, 5)
 
 
@@ -42,27 +37,21 @@ def mujocos_momentum(judge: judges.Mujoco, qpos: Array, qvel: Array) -> Array:
     return np.concatenate([mass * judge.data.subtree_linvel[0], judge.data.subtree_angmom[0]])
 
 
-def mujocos_momentum_rate(
-    state: fb.State, contacts: fb.Contacts, forces: Array, tau: Array
-) -> tuple[Array, Array]:
+def mujocos_momentum_rate(state, contacts, forces, tau):
     """Differentiate MuJoCo's momentum under forces at the contact points and joint torques, without
     ground. Return MuJoCo's q̈ in our coordinates, too.
     """
     judge = judges.Mujoco(state.robot).move_to(state)
     model, data = judge.model, judge.data
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(
-        mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
-    )
+    bits = mujoco.mjtDisableBit
+    model.opt.disableflags |= int(bits.mjDSBL_CONTACT) | int(bits.mjDSBL_CLAMPCTRL)
     owners = [contact.name for contact in contacts.friction_contacts for _ in contact.point_names]
-    data.qfrc_applied[:] = 0.0
-    for frame, point, force in zip(
-        owners, contacts.positions(state), forces.reshape(-1, 3), strict=True
-    ):
-        mujoco.mj_applyFT(
-            model, data, force, np.zeros(3), np.array(point), judge.body(frame), data.qfrc_applied
-        )
+    applied, points, none = data.qfrc_applied, np.array(contacts.positions(state)), np.zeros(3)
+    applied[:] = 0.0
+    for frame, point, force in zip(owners, points, forces.reshape(-1, 3), strict=True):
+        mujoco.mj_applyFT(model, data, force, none, point, judge.body(frame), applied)
     for joint, torque in zip(state.robot.joint_names, tau, strict=True):
-        data.qfrc_applied[model.joint(joint).dofadr[0]] += torque
+        applied[model.joint(joint).dofadr[0]] += torque
     mujoco.mj_forward(model, data)
     qpos, qvel, qacc, dt = data.qpos.copy(), data.qvel.copy(), data.qacc.copy(), 1e-6
     ends = []
@@ -87,12 +76,11 @@ def test_momentum_and_its_rate_are_mujocos(name):
         assert judges.relative(objectives.centroidal_momentum(state), found) < 1e-9
         forces = state.robot.weight * rng.normal(size=contacts.k)
         rate, qdd = mujocos_momentum_rate(state, contacts, forces, rng.normal(size=state.robot.d))
-        assert np.allclose(
-            objectives.centroidal_momentum_rate(state, qdd), rate, atol=1e-6 * np.abs(forces).sum()
-        )
+        found, scale = objectives.centroidal_momentum_rate(state, qdd), np.abs(forces).sum()
+        assert np.allclose(found, rate, atol=1e-6 * scale)
         # the motion q̇ changes the momentum, too
         still = objectives.centroidal_momentum_rate(state, np.zeros(state.robot.nv))
-        assert not np.allclose(still, rate, atol=1e-2 * np.abs(forces).sum())
+        assert not np.allclose(still, rate, atol=1e-2 * scale)
 
 
 def test_the_grasp_matrix_sums_forces_and_their_moments_about_any_point():
@@ -139,9 +127,7 @@ def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would
     moment = objectives.net_moment_matrix(state, contacts) @ up.ravel()
     assert moment[0] > 1.0
     rate = mujocos_momentum_rate(state, contacts, up.ravel(), np.zeros(12))[0][3:]
-    footnote = sum(
-        np.cross(state.com - x, f) for x, f in zip(contacts.positions(state), up, strict=True)
-    )
+    footnote = np.cross(state.com - contacts.positions(state), up).sum(axis=0)
     assert np.allclose(moment, rate, atol=1e-5)
     assert np.allclose(footnote, -rate, atol=1e-5)
 
@@ -178,9 +164,8 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name)
     for state in judges.states(name, 3):
         contacts = judges.stance(state.robot)
         a, spin = rng.normal(size=3), rng.normal(size=3)
-        cost = objectives.wrench_objective(
-            state, contacts, *objectives.desired_wrench(state, a, spin)
-        )
+        desired = objectives.desired_wrench(state, a, spin)
+        cost = objectives.wrench_objective(state, contacts, *desired)
         forces = cost.minimiser()
         assert cost(forces) < 1e-12 * state.robot.weight**2
         rate = mujocos_momentum_rate(state, contacts, forces, np.zeros(state.robot.d))[0]
@@ -199,10 +184,9 @@ def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed():
     force = force[[1, 0, 2]]  # 5 N sideways
     got = {}
     for weight in (1.0, 1e6):
-        cost = objectives.wrench_objective(
-            state, contacts, force, moment, moment_weight=weight
-        ).pullback(zeta)
-        got[weight] = objectives.com_wrench_map(state, contacts)(zeta(cost.minimiser()))
+        cost = objectives.wrench_objective(state, contacts, force, moment, moment_weight=weight)
+        forces = zeta(cost.pullback(zeta).minimiser())
+        got[weight] = objectives.com_wrench_map(state, contacts)(forces)
     missed = {weight: wrench - np.concatenate([force, moment]) for weight, wrench in got.items()}
     assert np.linalg.norm(missed[1.0][:3]) < 0.1 < 0.15 < np.linalg.norm(missed[1.0][3:])
     assert np.linalg.norm(missed[1e6][3:]) < 1e-3 and np.linalg.norm(missed[1e6][:3]) > 4.9
@@ -257,25 +241,20 @@ def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys():
     """
     state = judges.load("go2").standing()
     contacts = fb.Contacts.points(state.robot, normals=LEAN)
-    wrench = objectives.wrench_objective(
-        state, contacts, *objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
-    )
+    force, moment = objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
+    wrench = objectives.wrench_objective(state, contacts, force, moment)
     assert np.linalg.matrix_rank(wrench.H) == 6
     cost = wrench + 0.1 * objectives.force_bias(contacts, 0.5, 30.0)
     assert np.linalg.eigvalsh(cost.H)[0] > 1e-3
     x = cp.Variable((4, 3))
     points = contacts.positions(state)
-    force, moment = objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
-    terms = [0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)]
-    terms.append(
-        0.5
-        * cp.sum_squares(sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points)) - moment)
-    )
+    total = sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points))
+    direct = 0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)
+    direct += 0.5 * cp.sum_squares(total - moment)
     for i, n in enumerate(LEAN):
-        terms.append(
-            0.05 * cp.sum_squares(x[i] - n * (n @ x[i])) + 0.025 * cp.square(n @ x[i] - 30.0)
-        )
-    cp.Problem(cp.Minimize(sum(terms))).solve(**TIGHT)
+        direct += 0.05 * cp.sum_squares(x[i] - n * (n @ x[i]))
+        direct += 0.025 * cp.square(n @ x[i] - 30.0)
+    cp.Problem(cp.Minimize(direct)).solve(**TIGHT)
     assert np.allclose(cost.minimiser().reshape(4, 3), x.value, atol=1e-4)
 
 
@@ -344,13 +323,10 @@ def test_torques_for_the_forces_of_standing_stay_what_they_are_near_a_loss_of_ra
     standing, contacts = judges.load("solo8").standing(), fb.Contacts.points(judges.load("solo8"))
     desired = np.tile([0.0, 0.0, standing.robot.weight / 4], 4)
     rng = np.random.default_rng(0)
-    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent).replace(
-        v=0.1 * rng.normal(size=14)
-    )
-    there, here = (
-        objectives.torques_from_forces(fb.equations_of_motion(s, contacts)).torque(desired)
-        for s in (standing, near)
-    )
+    near = judges.along(standing, rng.normal(size=14), 10.0**-exponent)
+    near = near.replace(v=0.1 * rng.normal(size=14))
+    both = [fb.equations_of_motion(state, contacts) for state in (standing, near)]
+    there, here = (objectives.torques_from_forces(eom).torque(desired) for eom in both)
     assert np.max(np.abs(here - there)) < 0.3  # N·m
 
 

@@ -46,19 +46,11 @@ def test_the_relative_pose_residual_is_the_relative_acceleration_less_the_desire
         target[:3, 3] = pose(state)[:3, 3] - error[:3]
         target[:3, :3] = judges.rotation(-error[3:]) @ pose(state)[:3, :3]
         ahead, behind = (pose(judges.along(state, state.v, t))[:3, :3] for t in (STEP, -STEP))
-        rate = np.concatenate(
-            [
-                judges.derivative(lambda s, f=pose: f(s)[:3, 3], state, state.v),
-                judges.turn_between(ahead, behind) / (2.0 * STEP),
-            ]
-        )
-        actual = np.concatenate(
-            [
-                judges.acceleration_of(lambda s, f=pose: f(s)[:3, 3], state, qdd),
-                judges.turning_acceleration_of(lambda s, f=pose: f(s)[:3, :3], state, qdd),
-            ]
-        )
-        expected = actual - (feed - 7.0 * error - 3.0 * (rate - velocity))
+        moving = judges.derivative(lambda s, f=pose: f(s)[:3, 3], state, state.v)
+        rate = np.r_[moving, judges.turn_between(ahead, behind) / (2.0 * STEP)]
+        linear = judges.acceleration_of(lambda s, f=pose: f(s)[:3, 3], state, qdd)
+        angular = judges.turning_acceleration_of(lambda s, f=pose: f(s)[:3, :3], state, qdd)
+        expected = np.r_[linear, angular] - (feed - 7.0 * error - 3.0 * (rate - velocity))
         all_three = (pin.SE3(target), velocity, feed)
         for given in (all_three, (lambda t, given=all_three: given,)):
             task = RelativePoseTask(frame, reference, *given, kp=7.0, kd=3.0)
@@ -82,16 +74,11 @@ def test_the_axis_residual_is_its_acceleration_on_the_sphere_less_the_desired_on
         d_rate = np.cross(omega, d)
         d_acceleration = np.cross(alpha, d) + np.cross(omega, d_rate)
         normal = np.cross(d, n) / np.linalg.norm(np.cross(d, n))
-        desired = (
-            np.cross(d, d_acceleration)
-            - 7.0 * np.arccos(d @ n) * normal
-            - 3.0 * (np.cross(n, rate) - np.cross(d, d_rate))
-        )
+        desired = np.cross(d, d_acceleration) - 7.0 * np.arccos(d @ n) * normal
+        desired -= 3.0 * (np.cross(n, rate) - np.cross(d, d_rate))
         expected = np.cross(n, acceleration) - (desired - n * (n @ desired))
-        for given in (
-            (direction, omega, alpha),
-            (lambda t, all_three=(direction, omega, alpha): all_three,),
-        ):
+        all_three = (direction, omega, alpha)
+        for given in (all_three, (lambda t, given=all_three: given,)):
             residual = AxisTask(frame, axis, *given, kp=7.0, kd=3.0).residual(eom)
             assert np.allclose(residual(qdd), expected, atol=5e-5)
             assert np.allclose(n @ residual.A, 0.0, atol=1e-12)  # rotation about it is free
@@ -112,16 +99,13 @@ def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_t
         state, contacts = robot.standing(), judges.stance(robot)
         eom = fb.equations_of_motion(state, contacts)
         rng = np.random.default_rng(0)
-        forces = np.column_stack(
-            [rng.normal(0.0, 20.0, (eom.k // 3, 2)), rng.uniform(1.0, 200.0, eom.k // 3)]
-        )
+        n = eom.k // 3
+        forces = np.column_stack([rng.normal(0.0, 20.0, (n, 2)), rng.uniform(1.0, 200.0, n)])
         centre = centre_of_pressure(state, contacts, forces)
         shift = np.array([0.03, -0.02, 0.0])
         total = forces[:, 2].sum()
-        for target, expected in (
-            (centre, [0.0, 0.0]),
-            (centre - shift, [shift[1] * total, -shift[0] * total]),
-        ):
+        moment = [shift[1] * total, -shift[0] * total]
+        for target, expected in ((centre, [0.0, 0.0]), (centre - shift, moment)):
             for given in (target, lambda t, target=target: target):
                 residual = CentreOfPressureTask(given).residual(eom)
                 assert np.allclose(residual(forces.ravel()), expected, atol=1e-9 * total)
@@ -150,11 +134,8 @@ def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves():
     goal = at.frame_pose(HANDS[1]).actInv(at.frame_pose(HANDS[0])).homogeneous
     goal[:3, 3] += [0.0, 0.05, 0.03]
     goal[:3, :3] = judges.rotation([0.2, 0.0, 0.0]) @ goal[:3, :3]
-    tasks = [
-        fb.CoMTask(lambda t: at.com + [0.0, 0.02 * np.sin(3.0 * t), 0.0]),
-        *fb.standing_tasks(at)[1:],
-        RelativePoseTask(*HANDS, goal),
-    ]
+    sway = fb.CoMTask(lambda t: at.com + [0.0, 0.02 * np.sin(3.0 * t), 0.0])
+    tasks = [sway, *fb.standing_tasks(at)[1:], RelativePoseTask(*HANDS, goal)]
     controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
     run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=2e-3)
     assert run.outcome == "completed"
@@ -176,11 +157,10 @@ def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_other
         fb.PostureTask(at.q),
     ]
     controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
-    R = fb.rollout(fb.Simulation(robot), controller, 2.0, control_period=2e-3).final.frame_pose(
-        "base"
-    )
-    assert np.linalg.norm(np.cross(R.rotation @ UP, direction)) < 5e-3
-    assert abs(np.arctan2(R.rotation[1, 0], R.rotation[0, 0]) - 0.15) < 0.02
+    run = fb.rollout(fb.Simulation(robot), controller, 2.0, control_period=2e-3)
+    R = run.final.frame_pose("base").rotation
+    assert np.linalg.norm(np.cross(R @ UP, direction)) < 5e-3
+    assert abs(np.arctan2(R[1, 0], R[0, 0]) - 0.15) < 0.02
 
 
 def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet():
@@ -196,11 +176,9 @@ def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet():
         controller = fb.WholeBodyController(robot, contacts, tasks, backend="compiled")
         run = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=2e-3)
         assert run.outcome == "completed"
-        found = [
-            centre_of_pressure(at.replace(q=q), contacts, forces)[1] - target(t)[1]
-            for t, q, forces in zip(run.time, run.q, run.measured, strict=True)
-            if t > 0.3
-        ]
+        late = [i for i, t in enumerate(run.time) if t > 0.3]
+        points = [centre_of_pressure(run.state(i), contacts, run.measured[i]) for i in late]
+        found = [p[1] - target(run.time[i])[1] for i, p in zip(late, points, strict=True)]
         return float(np.sqrt(np.mean(np.square(found))))
 
     without = error()

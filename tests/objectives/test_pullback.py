@@ -14,6 +14,7 @@ from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 from floatbase.errors import InputError
 
+READINGS = (objectives.partial_minimum, objectives.minimum_norm_pullback)
 BLOCKS = ("qdd", "tau", "forces")
 
 
@@ -36,11 +37,7 @@ def as_quadratics(residuals: dict[str, tuple[Array, Array]]) -> dict[str, Quadra
     return {block: Quadratic.from_residual(A, r) for block, (A, r) in residuals.items()}
 
 
-def least(
-    eom: EquationsOfMotion,
-    residuals: dict[str, tuple[Array, Array]],
-    fixed: dict[str, Array] | None = None,
-) -> float:
+def least(eom, residuals, fixed=None):
     """Minimize the sum of ½‖A x - r‖² over all (q̈, τ, λ) with eq. (7) and some fixed blocks.
 
     Stationarity and feasibility are solved as one linear system and checked. A convex cost has its
@@ -51,10 +48,8 @@ def least(
     H, g = np.zeros((ends[-1], ends[-1])), np.zeros(ends[-1])
     for block, (A, r) in residuals.items():
         H[at[block], at[block]], g[at[block]] = A.T @ A, A.T @ r
-    rows = [
-        np.hstack([eom.M, -eom.S, -eom.J.T]),
-        np.hstack([eom.A, np.zeros((len(eom.A), eom.d + eom.k))]),
-    ]
+    motion = np.hstack([eom.A, np.zeros((len(eom.A), eom.d + eom.k))])
+    rows = [np.hstack([eom.M, -eom.S, -eom.J.T]), motion]
     sides = [-eom.h, eom.b]
     for block, value in (fixed or {}).items():
         rows.append(np.eye(ends[-1])[at[block]])
@@ -64,10 +59,8 @@ def least(
     right = np.concatenate([g, e])
     found = np.linalg.lstsq(kkt, right, rcond=1e-12)[0]
     assert np.max(np.abs(kkt @ found - right)) < 1e-8 * np.max(np.abs(right))
-    parts = {block: found[part] for block, part in at.items()}
-    return sum(
-        0.5 * float(np.sum((A @ parts[block] - r) ** 2)) for block, (A, r) in residuals.items()
-    )
+    gaps = [A @ found[at[block]] - r for block, (A, r) in residuals.items()]
+    return sum(0.5 * float(np.sum(gap**2)) for gap in gaps)
 
 
 # (15)(18) -----------------------------------------------------------------------------------------
@@ -84,9 +77,8 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
         for _ in range(5):
             tau = rng.normal(size=eom.d)
             kkt = np.block([[eom.M, -eom.J.T], [eom.A, np.zeros((len(eom.A), eom.k))]])
-            qdd = np.linalg.lstsq(kkt, np.concatenate([eom.S @ tau - eom.h, eom.b]), rcond=1e-11)[
-                0
-            ][: eom.nv]
+            right = np.concatenate([eom.S @ tau - eom.h, eom.b])
+            qdd = np.linalg.lstsq(kkt, right, rcond=1e-11)[0][: eom.nv]
             assert seen(tau) == pytest.approx(cost(qdd), rel=1e-7)
 
 
@@ -108,9 +100,8 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
     seen = objectives.cost_on_space(space, **as_quadratics(residuals))
     beta = seen.minimiser()
     assert seen(beta) == pytest.approx(least(eom, residuals), rel=1e-6)
-    assert sum(
-        Quadratic.from_residual(*residuals[b])(x) for b, x in zip(BLOCKS, space(beta), strict=True)
-    ) == pytest.approx(seen(beta), rel=1e-9)
+    parts = zip(as_quadratics(residuals).values(), space(beta), strict=True)
+    assert sum(cost(x) for cost, x in parts) == pytest.approx(seen(beta), rel=1e-9)
 
 
 def test_costs_may_be_given_on_any_of_the_three_and_add_up():
@@ -151,10 +142,7 @@ def test_the_best_reading_is_the_least_that_a_value_of_the_block_can_cost(name, 
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     cost = objectives.cost_on_space(space, **as_quadratics(residuals))
-    best, smallest = (
-        f(cost, space, block)
-        for f in (objectives.partial_minimum, objectives.minimum_norm_pullback)
-    )
+    best, smallest = (reading(cost, space, block) for reading in READINGS)
     rng = np.random.default_rng(0)
     for seed in range(2):
         x = space.map[block](3.0 * rng.normal(size=space.dimension))
@@ -175,10 +163,7 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
         space, found = dynamics.feasible_space(eom), dynamics.dimensions(eom)
         assert (found.rank_V_qdd == found.null_B) == agree
         cost = objectives.cost_on_space(space, **as_quadratics(costs(eom)))
-        best, smallest = (
-            f(cost, space, "qdd")
-            for f in (objectives.partial_minimum, objectives.minimum_norm_pullback)
-        )
+        best, smallest = (reading(cost, space, "qdd") for reading in READINGS)
         rng = np.random.default_rng(0)
         for _ in range(4):
             x = space.qdd(rng.normal(size=space.dimension))
@@ -192,21 +177,11 @@ def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_readi
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
-    cost = objectives.cost_on_space(
-        space,
-        tau=Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-3),
-        forces=Quadratic.from_residual(sideways, np.zeros(12)),
-    )
-    still = np.zeros(18)
-    smallest, best = (
-        f(cost, space, "qdd")(still)
-        for f in (objectives.minimum_norm_pullback, objectives.partial_minimum)
-    )
-    expected = least(
-        eom,
-        {"tau": (np.sqrt(1e-3) * np.eye(12), np.zeros(12)), "forces": (sideways, np.zeros(12))},
-        {"qdd": still},
-    )
+    still, none = np.zeros(18), np.zeros(12)
+    residuals = {"tau": (np.sqrt(1e-3) * np.eye(12), none), "forces": (sideways, none)}
+    cost = objectives.cost_on_space(space, **as_quadratics(residuals))
+    best, smallest = (reading(cost, space, "qdd")(still) for reading in READINGS)
+    expected = least(eom, residuals, {"qdd": still})
     assert best == pytest.approx(expected, rel=1e-6)
     assert smallest / best == pytest.approx(29.0, abs=0.5)
 
@@ -222,10 +197,8 @@ def test_accelerations_that_cannot_change_do_not_determine_beta():
     assert np.max(np.abs(space.qdd.A)) < 1e-10
     assert np.max(np.abs(objectives.minimum_norm_coordinates(space, "qdd").A)) < 1e6
     cost = objectives.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
-    least = cost(cost.minimiser())  # q̈ leaves everything free
-    assert objectives.partial_minimum(cost, space, "qdd")(np.zeros(18)) == pytest.approx(
-        least, abs=1e-6
-    )
+    found = objectives.partial_minimum(cost, space, "qdd")(np.zeros(18))
+    assert found == pytest.approx(cost(cost.minimiser()), abs=1e-6)  # q̈ leaves everything free
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused():
@@ -270,11 +243,9 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading():
     space = dynamics.feasible_space(eom)
     desired = np.arange(12.0)
     for weight in (1e-2, 1e-6, 1e-10):
-        cost = objectives.cost_on_space(
-            space,
-            tau=Quadratic.from_residual(np.eye(8), np.zeros(8)),
-            forces=Quadratic.from_residual(np.eye(12), desired, weight),
-        )
+        tau = Quadratic.from_residual(np.eye(8), np.zeros(8))
+        forces = Quadratic.from_residual(np.eye(12), desired, weight)
+        cost = objectives.cost_on_space(space, tau=tau, forces=forces)
         beta = objectives.argmin_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)
         assert np.allclose(N.T @ (space.forces(beta) - desired), 0.0, atol=1e-3), weight

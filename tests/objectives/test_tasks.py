@@ -58,17 +58,14 @@ def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_o
         R = eom.state.frame_pose(frame).rotation
         error, velocity, feed = 0.5 * rng.normal(size=(3, 3))
         # R R_dᵀ = exp(error): the frame is ahead of its target by `error`, about axes of the world
-        task = fb.OrientationTask(
-            frame, judges.rotation(-error) @ R, velocity, feed, kp=7.0, kd=3.0
-        )
-        actual = judges.turning_acceleration_of(
-            lambda s, f=frame: s.frame_pose(f).rotation, eom.state, qdd
-        )
-        step = 1e-5
-        ahead, behind = (
-            judges.along(eom.state, eom.state.v, t).frame_pose(frame).rotation
-            for t in (step, -step)
-        )
+        target, step = judges.rotation(-error) @ R, 1e-5
+        task = fb.OrientationTask(frame, target, velocity, feed, kp=7.0, kd=3.0)
+
+        def turned(state: fb.State, frame: str = frame) -> np.ndarray:
+            return state.frame_pose(frame).rotation
+
+        actual = judges.turning_acceleration_of(turned, eom.state, qdd)
+        ahead, behind = (turned(judges.along(eom.state, eom.state.v, t)) for t in (step, -step))
         moving = judges.turn_between(ahead, behind) / (2.0 * step)
         desired = feed - 7.0 * error - 3.0 * (moving - velocity)
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=5e-5)
@@ -144,12 +141,8 @@ def test_a_moving_target_is_evaluated_once_a_tick_and_followed_without_lag():
 
     def path(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         asked.append(t)
-        side = np.array([0.0, amplitude, 0.0])
-        return (
-            state.com + side * np.sin(rate * t),
-            side * rate * np.cos(rate * t),
-            -side * rate**2 * np.sin(rate * t),
-        )
+        side, s, c = np.array([0.0, amplitude, 0.0]), np.sin(rate * t), np.cos(rate * t)
+        return state.com + side * s, side * rate * c, -side * rate**2 * s
 
     def error(position: Callable[[float], Any]) -> float:
         tasks = [fb.CoMTask(position, weight=1e3), *fb.standing_tasks(state)[1:]]
@@ -210,11 +203,8 @@ def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_stil
         run = fb.rollout(fb.Simulation(robot), controller, 2.5, control_period=2e-3)
         left = 1e3 * float(np.linalg.norm(target - run.com[-1]))
         speed = float(np.abs(run.final.v).max())
-        wrong += (
-            []
-            if left < 1.0 and speed < STILL
-            else [f"{name}: {left:.2f} mm short, {speed:.1e} rad/s or m/s"]
-        )
+        if left > 1.0 or speed > STILL:
+            wrong.append(f"{name}: {left:.2f} mm short, {speed:.1e} rad/s or m/s")
     assert wrong == []
 
 
@@ -223,18 +213,10 @@ def test_standing_tasks_keep_the_arms_where_they_were():
     for name, part in (("anymal_kinova", "j2s6s200"), ("talos", "arm"), ("ur5", "")):
         robot = judges.load(name)
         standing = robot.standing()
-        arms = [
-            robot.nv - robot.d + i
-            for i, joint in enumerate(robot.joint_names)
-            if joint.startswith(part)
-        ]
-        assert arms
-        pushes = (
-            [fb.Push([0.0, 0.15 * robot.weight, 0.0], start=0.2, duration=0.1)]
-            if robot.is_floating
-            else []
-        )
-        run = fb.rollout(
-            fb.Simulation(robot), judges.controller_of(name), 3.0, pushes, control_period=2e-3
-        )
-        assert np.abs(run.final.difference(standing.q)[arms]).max() < DRIFT, name
+        arms = [joint.startswith(part) for joint in robot.joint_names]
+        assert any(arms)
+        push = fb.Push([0.0, 0.15 * robot.weight, 0.0], start=0.2, duration=0.1)
+        pushes, sim = [push] if robot.is_floating else [], fb.Simulation(robot)
+        run = fb.rollout(sim, judges.controller_of(name), 3.0, pushes, control_period=2e-3)
+        drift = run.final.difference(standing.q)[-robot.d :]
+        assert np.abs(drift[arms]).max() < DRIFT, name
