@@ -1,10 +1,7 @@
 """Components of a force, the exact cone, its projection, and the facets and edges of polyhedra."""
 
-from __future__ import annotations
-
 import cvxpy as cp
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
 
-Array = npt.NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
 
 seeds = st.integers(0, 100_000)
@@ -23,12 +19,12 @@ facets = st.integers(3, 32)
 mus = st.floats(0.05, 3.0)
 
 
-def any_normal(rng: np.random.Generator) -> Array:
+def any_normal(rng):
     raw = rng.normal(size=3)
     return raw / np.linalg.norm(raw)
 
 
-def any_force(rng: np.random.Generator) -> Array:
+def any_force(rng):
     """Return a force of any direction, from 1 mN to 10 kN."""
     return rng.normal(size=3) * 10.0 ** rng.uniform(-3, 4)
 
@@ -143,7 +139,7 @@ def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_i
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
 
 
-def slips(force: Array, normal: Array, mu: float) -> float:
+def slips(force, normal, mu):
     """Return α∥ - μ α⊥ of (28) in N: how far a force lies outside the exact cone."""
     pressing = float(normal @ force)
     return float(np.linalg.norm(force - pressing * normal)) - mu * pressing
@@ -220,7 +216,7 @@ def test_tangents_are_right_handed_with_the_normal(seed):
     assert np.allclose([t1 @ t1, t2 @ t2, t1 @ t2, t1 @ normal], [1.0, 1.0, 0.0, 0.0], atol=1e-12)
 
 
-def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parameter, cp.Variable]:
+def nearest_in_cone():
     """Return the projection onto the exact second-order cone, written for any normal and μ."""
     x, f = cp.Variable(3), cp.Parameter(3)
     tangential, pressing = cp.Parameter((3, 3)), cp.Parameter(3)

@@ -1,7 +1,5 @@
 """Centre of pressure and wrench of a sole: by definition, and against MuJoCo's contact forces."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ TALOS = judges.load("talos")
 SOLES = judges.stance(TALOS)
 
 
-def loads(seed: int) -> np.ndarray:
+def loads(seed):
     """Return forces at the corners of both soles that push up, shape (8, 3), N."""
     rng = np.random.default_rng(seed)
     return np.column_stack([rng.normal(0.0, 20.0, (8, 2)), rng.uniform(0.0, 200.0, 8)])

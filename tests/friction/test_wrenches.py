@@ -1,18 +1,14 @@
 """Wrenches of a stance against cvxpy, linear programs over rows and rays, and brute force."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import count
 
 import cvxpy as cp
 import judges
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from judges import Array
 from messages import raises, refused
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
@@ -29,7 +25,7 @@ STANCES = [("go2", 4), ("go2", 3), ("go2", 2), ("go2", 1), ("talos", 2), ("talos
 
 
 @cache
-def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contacts]:
+def stance(name, feet, tilt=0.0):
     """Return a robot standing on its first feet, each on its own slope if tilt > 0."""
     robot = judges.load(name)
     kind = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
@@ -39,14 +35,7 @@ def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contac
     )
 
 
-def of(
-    points: npt.ArrayLike,
-    normals: npt.ArrayLike,
-    mu: float = 0.7,
-    n: int = 4,
-    inside: bool = True,
-    limit: npt.ArrayLike = np.inf,
-) -> WrenchSet:
+def of(points, normals, mu=0.7, n=4, inside=True, limit=np.inf):
     """Return the set of contact points without a robot, with weight 100 N, about the origin."""
     cones = tuple(
         FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float)
@@ -56,7 +45,7 @@ def of(
     )
 
 
-def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) -> WrenchSet:
+def feet_on_slopes(seed, n=4, facets=4, inside=True):
     """Return feet about a metre apart, some higher than others, each on its own slope."""
     rng = np.random.default_rng(seed)
     return of(
@@ -64,7 +53,7 @@ def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) 
     )
 
 
-def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
+def random_wrenches(wrenches, n, seed):
     """Return sums of forces in the cones, so inside the set; perturb all but the first quarter.
 
     The perturbations grow with the index.
@@ -78,7 +67,7 @@ def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
 class Judge:
     """(20)(21)(28) in cvxpy: how far inside its cone every force can be, for four facets."""
 
-    def __init__(self, points: Array, normals: Array, mu: float, exact: bool):
+    def __init__(self, points, normals, mu, exact):
         forces, self.about, self.wrench = (
             cp.Variable((len(points), 3)),
             cp.Parameter(3),
@@ -100,10 +89,10 @@ class Judge:
         self.problem = cp.Problem(cp.Maximize(self.t), rows)
 
     @staticmethod
-    def _cross(a: cp.Expression, b: cp.Expression) -> list[cp.Expression]:
+    def _cross(a, b):
         return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
-    def margin(self, about: Array, wrench: Array) -> float:
+    def margin(self, about, wrench):
         self.about.value, self.wrench.value = about, wrench
         self.problem.solve(solver=cp.CLARABEL)
         return (
@@ -280,12 +269,12 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2():
 # where a robot can stand
 
 
-def counter_clockwise(polygon: Array) -> bool:
+def counter_clockwise(polygon):
     x, y = polygon.T
     return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) > 0
 
 
-def depth(polygon: Array, at: Array) -> float:
+def depth(polygon, at):
     """Return how far inside a counter-clockwise polygon a point is, m."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     inwards = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]

@@ -1,7 +1,5 @@
 """Lesson P: its runs are what they say, and can be plotted."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -18,7 +16,7 @@ def test_an_unknown_mass_lowers_the_centre_of_mass_like_a_spring(kp):
     assert com_sag(kp, 0.0) == pytest.approx(0.0, abs=1e-5)
 
 
-def _shift() -> np.ndarray:
+def _shift():
     """By the formula for the foot of a plumb line on a line through two points."""
     state = GO2.standing()
     (x1, y1, _), (x2, y2, _), (x0, y0, _) = (

@@ -2,12 +2,8 @@
 error.
 """
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,12 +21,12 @@ pytestmark = pytest.mark.usefixtures("learner")
 
 
 @pytest.fixture
-def said(capsys: pytest.CaptureFixture[str]) -> Any:
+def said(capsys):
     """What was printed since it was last asked for."""
     return lambda: capsys.readouterr().out.splitlines()
 
 
-def lines(learner: Path) -> list[Any]:
+def lines(learner):
     """What stands in the learner's file, without times."""
     path = learner / "progress.jsonl"
     text = path.read_text() if path.exists() else ""

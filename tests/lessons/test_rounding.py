@@ -1,7 +1,5 @@
 """Numbers as text: two significant digits, zero below a floor, independent of the last bits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The back ends behind `solve`: one answer and one set of errors, whatever the units."""
 
-from __future__ import annotations
-
 import sys
 from fractions import Fraction
 
@@ -12,7 +10,7 @@ from messages import missing, raises, refused
 
 import floatbase as fb
 from floatbase.errors import InfeasibleError, MissingDependencyError, SolverError
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, Solution, solve, solvers
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, solve, solvers
 
 NONE = np.zeros((0, 2)), np.zeros(0)
 # N·m: a rounding of 1e-16 divided by a part of 1e-12 in curvature is 1e-4; polished answers leave
@@ -21,7 +19,7 @@ LAST_DIGITS = 1e-7
 EXACT = ("daqp", "active_set")  # solvers that end at a vertex of rows rather than near it
 
 
-def corner(scale: float = 1.0, row_scale: float = 1.0, equality_scale: float = 1.0) -> QP:
+def corner(scale=1.0, row_scale=1.0, equality_scale=1.0):
     """min ½ x² + ½ y² + ½ z² - 3 x, x ≤ 1, y ≥ 0.5, x + z = 2, in other units: (1, 0.5, 1), μ = (3,
     0.5), ν = -1.
     """
@@ -92,7 +90,7 @@ def test_what_vanishes_on_the_equalities_comes_out_as_zero_and_not_as_rounding()
         assert np.allclose(u @ solve(qp, solver).x, -3.0)
 
 
-def judges_qp(name: str, seed: int) -> QP:
+def judges_qp(name, seed):
     robot = judges.load(name)
     limits = 0.4 * robot.torque_limits
     tasks = fb.standing_tasks(robot.standing())
@@ -245,7 +243,7 @@ def test_inconsistent_equalities_are_named_by_a_smallest_set(solver):
         assert QP(np.eye(2), np.zeros(2), A[rest], qp.b[rest], *NONE).equality_space.n_in >= 0
 
 
-def residual_torque(solution: Solution) -> float:
+def residual_torque(solution):
     """How far, N·m, one Newton step on the optimality conditions of the active rows would still
     move a torque.
 
@@ -268,7 +266,7 @@ def residual_torque(solution: Solution) -> float:
     return float(np.max(np.abs(step[qp.blocks["tau"]])))
 
 
-def exact_sum(A: np.ndarray, x: np.ndarray, b: np.ndarray) -> np.ndarray:
+def exact_sum(A, x, b):
     """A x + b, rounded once."""
     fractions = [Fraction(float(value)) for value in x]
     rows = [

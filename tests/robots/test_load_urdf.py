@@ -2,8 +2,6 @@
 cannot be used.
 """
 
-from __future__ import annotations
-
 import pickle
 import warnings
 from pathlib import Path
@@ -151,13 +149,7 @@ def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path):
 LIMIT = '<limit effort="5" velocity="9" lower="0.5" upper="2"/>'
 
 
-def two_links(
-    mass: object = 1.0,
-    iyy: object = 1.0,
-    joint: str = "elbow",
-    kind: str = "revolute",
-    extra: str = LIMIT,
-) -> str:
+def two_links(mass=1.0, iyy=1.0, joint="elbow", kind="revolute", extra=LIMIT):
     """A URDF: a base of 1 kg, and a link that a joint moves."""
     link = (
         '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="{}" izz="1" ixy="0" '

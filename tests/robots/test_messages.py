@@ -1,7 +1,5 @@
 """What robots, states and names refuse: the type of each error, and the names and numbers in it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import judges
@@ -21,7 +19,7 @@ Q = GO2.standing().q
 UPSIDE_DOWN = np.array([*Q[:3], 0.0, 0.0, 0.0, 0.0, *Q[7:]])  # a quaternion of no length
 
 
-def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
+def with_entry(value, at, entry):
     changed = np.array(value)
     changed[at] = entry
     return changed
@@ -116,7 +114,7 @@ def test_unknown_names_list_the_near_ones_or_all_of_a_few():
 
 
 class Unprintable:
-    def __repr__(self) -> str:
+    def __repr__(self):
         raise RuntimeError
 
 

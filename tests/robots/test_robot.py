@@ -1,7 +1,5 @@
 """A robot: its numbers, its feet, its actuation matrix, the postures it stands in."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 
 import example_robot_data
@@ -19,12 +17,12 @@ from floatbase.lessons import joint_servo
 
 
 @pytest.fixture(params=judges.ROBOTS)
-def robot(request: pytest.FixtureRequest) -> fb.Robot:
+def robot(request):
     return judges.load(request.param)
 
 
 @pytest.fixture(params=judges.FLOATING)
-def floating(request: pytest.FixtureRequest):
+def floating(request):
     return judges.load(request.param)
 
 

@@ -1,11 +1,7 @@
 """States: validated, immutable, and with frames in the world where MuJoCo has them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from operator import attrgetter, methodcaller
-from typing import Any
 
 import judges
 import numpy as np
@@ -119,7 +115,7 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name):
     """Pinocchio's algorithms write to one memory: none may change what another has left there."""
     robot = judges.load(name)
     parts = ("M", "h", "com", "com_velocity", "com_drift", "com_jacobian", "joint_transforms")
-    questions: list[Callable[[fb.State], Any]] = [attrgetter(part) for part in parts]
+    questions = [attrgetter(part) for part in parts]
     for frame in ("base", robot.frames[-1]):
         of_frame = (
             methodcaller(ask, frame)
@@ -141,7 +137,7 @@ def test_threads_may_ask_the_same_state(name):
     states = [robot.random_state(seed) for seed in range(4)]
     expected = [robot.random_state(seed).frame_drift("base") for seed in range(4)]
 
-    def ask(i: int) -> bool:
+    def ask(i):
         return np.array_equal(states[i % 4].frame_drift("base"), expected[i % 4])
 
     with ThreadPoolExecutor(4) as threads:
@@ -163,7 +159,7 @@ def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(name):
     robot, step = judges.load(name), 1e-6
     state = robot.random_state(3, 0.3)
 
-    def momentum(q: np.ndarray) -> np.ndarray:
+    def momentum(q):
         data = robot.model.createData()
         return pin.computeCentroidalMomentum(robot.model, data, q, state.v).vector
 

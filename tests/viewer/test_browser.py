@@ -1,7 +1,5 @@
 """The page in a real browser. Screenshots go to build/screenshots."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np
@@ -74,7 +72,7 @@ VALUES = (
 
 @pytest.mark.front_end
 def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer):
-    heard: defaultdict[str, list[object]] = defaultdict(list)
+    heard = defaultdict(list)
     for name in NAMES:
         box, button = f"box {name}", f"button {name}"
         viewer.add_slider(name, heard[name].append, 0.0, -1.0, 1.0)

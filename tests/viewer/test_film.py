@@ -1,7 +1,5 @@
 """Films and images: what they show, and errors if they cannot be made."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from contextlib import closing
@@ -25,7 +23,7 @@ SOME = 20  # of 255: by which a pixel is another
 
 
 @pytest.fixture(scope="module")
-def view(request: pytest.FixtureRequest) -> fb.Viewer:
+def view(request):
     robot = fb.load("go2")
     controller = fb.WholeBodyController(
         robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
@@ -48,7 +46,7 @@ def test_a_film_that_would_take_hours_is_refused(tmp_path):
     view.close()
 
 
-def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
+def share_of_others(first, second):
     """Return the fraction of the pixels that differ between two images."""
     return float(np.mean(np.abs(first.astype(int) - second).max(axis=2) > SOME))
 

@@ -1,15 +1,11 @@
 """The picture in a notebook: frame rates, busy kernels, slow or foreign pages, saved output."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from typing import Any
 
 import nbformat
 import numpy as np
@@ -50,15 +46,15 @@ LOADS = """() => {
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
-def put(window: Window, number: float) -> None:
+def put(window, number):
     window.put([protocol.set_transform("/meshcat/a", np.eye(4) * number)])
 
 
-def newest(commands: list[dict]) -> float:
+def newest(commands):
     return float(commands[-1]["matrix"][0])
 
 
-def shown(window: Window, in_cell: bool = False) -> Client:
+def shown(window, in_cell=False):
     """Return a page that has drawn the first frame."""
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=in_cell)
@@ -66,7 +62,7 @@ def shown(window: Window, in_cell: bool = False) -> Client:
     return client
 
 
-def draw_for(window: Window, seconds: float) -> int:
+def draw_for(window, seconds):
     """Draw something new repeatedly; return how often."""
     drawn, until_then = 0, time.monotonic() + seconds
     while time.monotonic() < until_then:
@@ -76,7 +72,7 @@ def draw_for(window: Window, seconds: float) -> int:
     return drawn
 
 
-def frames_of(client: Client) -> int:
+def frames_of(client):
     """Return how many frames have arrived by now."""
     time.sleep(2 * BLIND)
     return sum("frame" in client.messages.get()[0] for _ in range(client.messages.qsize()))
@@ -109,20 +105,20 @@ def test_a_page_that_answers_gets_the_pace_and_no_more(window):
 
 
 @pytest.fixture
-def shell() -> Iterator[InteractiveShell]:
+def shell():
     yield InteractiveShell.instance()
     InteractiveShell.clear_instance()
 
 
 @pytest.fixture
-def cell_window(shell: InteractiveShell) -> Iterator[Window]:
+def cell_window(shell):
     with Window() as opened:
         shell.events.trigger("post_run_cell", None)  # the cell that opened it
         yield opened
 
 
 @contextmanager
-def busy(shell: InteractiveShell) -> Iterator[None]:
+def busy(shell):
     """Run a cell."""
     shell.events.trigger("pre_run_cell", None)
     yield
@@ -158,7 +154,7 @@ def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):
     client = Client(window.widget("a", 100))
     client.frame()
 
-    def let_go() -> bool:
+    def let_go():
         put(window, 1)
         return window.n_pages == 0
 
@@ -231,7 +227,7 @@ def test_a_closed_window_informs_its_pages_once_and_new_ones_on_request(window):
 
 
 @pytest.fixture
-def notebook(page) -> Iterator[Notebook]:
+def notebook(page):
     page.set_viewport_size({"width": 450, "height": 400})
     opened = Notebook()
     page.goto(opened.url)
@@ -244,7 +240,7 @@ def notebook(page) -> Iterator[Notebook]:
 TITLE = "document.getElementById('title').textContent"
 
 
-def displayed(notebook: Notebook, page: Any, viewer: Viewer) -> Any:
+def displayed(notebook, page, viewer):
     """Display a viewer in the notebook; return its frame, when it has drawn."""
     frame = notebook.show(page, viewer.widget())
     frame.wait_for_function(DRAWN)
