@@ -109,11 +109,8 @@ def nodes(path):
 @cache
 def imports(path):
     """All imports of the package's modules at run time, also inside functions."""
-    blocks = [
-        node
-        for node in nodes(path)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-    ]
+    branches = [node for node in nodes(path) if isinstance(node, ast.If)]
+    blocks = [node for node in branches if "TYPE_CHECKING" in ast.unparse(node.test)]
     for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
     found = []
     for node in nodes(path):
@@ -127,11 +124,8 @@ def imports(path):
                 # `from floatbase import viewer` imports a module, `from floatbase import Viewer`
                 # a name
                 inner, outer = f"{node.module}.{name}", str(node.module)
-                found.append(
-                    Import(node.lineno, inner, None)
-                    if file_of(inner)
-                    else Import(node.lineno, outer, name)
-                )
+                target = (inner, None) if file_of(inner) else (outer, name)
+                found.append(Import(node.lineno, *target))
     return [one for one in found if one.module.split(".")[0] == "floatbase"]
 
 
@@ -255,11 +249,8 @@ def test_modules_are_short_documented_and_finished():
             wrong.append(f"{relative(path)} has {count} lines without docstrings")
         if not ast.get_docstring(parsed(path)):
             wrong.append(f"{relative(path)} has no docstring")
-        wrong += [
-            f"{relative(path)} contains {word}"
-            for word in ("TODO", "FIXME", "XXX")
-            if word in source
-        ]
+        words = [word for word in ("TODO", "FIXME", "XXX") if word in source]
+        wrong += [f"{relative(path)} contains {word}" for word in words]
     assert not wrong, "\n".join(wrong)
 
 

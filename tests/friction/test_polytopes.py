@@ -69,11 +69,8 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed, n, rank):
         return
     basis = np.linalg.svd(points - points[0])[2][:rank].T
     flat = (points - points[0]) @ basis
-    expected = (
-        {int(np.argmin(flat)), int(np.argmax(flat))}
-        if rank == 1
-        else set(ConvexHull(flat).vertices.tolist())
-    )
+    ends = {int(np.argmin(flat)), int(np.argmax(flat))}
+    expected = ends if rank == 1 else set(ConvexHull(flat).vertices.tolist())
     assert {int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in found} == expected
     assert len(found) == len(expected)
 

@@ -96,9 +96,8 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it():
 
 
 def test_a_row_that_would_have_to_pull_is_dropped():
-    first, second = active_set(
-        table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]
-    ).iterations
+    run = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"])
+    first, second = run.iterations
     assert first.multipliers == {"table": pytest.approx(-1.0)} and first.dropped == "table"
     assert second.working_set == ()
     assert np.allclose(second.x_next, [0.5, 1.0])
@@ -202,9 +201,8 @@ def swaying_qps(name, ticks, dt=0.002):
     tasks = [com, *fb.standing_tasks(state)[1:]]
     contacts = judges.stance(robot, mu=0.25)
     limits = 0.6 * robot.torque_limits
-    controller = fb.WholeBodyController(
-        robot, contacts, tasks, torque_limits=limits, backend="reference"
-    )
+    options = {"torque_limits": limits, "backend": "reference"}
+    controller = fb.WholeBodyController(robot, contacts, tasks, **options)
     qps = []
     for tick in range(ticks):
         qps.append(controller.qp(state, 0.2 + tick * dt))
@@ -233,9 +231,8 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name, ticks):
 def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name):
     robot = judges.load(name)
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
-    controller = fb.WholeBodyController(
-        robot, contacts, tasks, min_normal_force=2000.0, solver="active_set"
-    )
+    options = {"min_normal_force": 2000.0, "solver": "active_set"}
+    controller = fb.WholeBodyController(robot, contacts, tasks, **options)
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, robot.standing().v)
     assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
@@ -287,12 +284,8 @@ def test_beales_cycling_example_terminates():
     """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back
     to its start.
     """
-    rows = [
-        [0.25, -60.0, -1 / 25, 9.0],
-        [0.5, -90.0, -1 / 50, 3.0],
-        [0.0, 0.0, 1.0, 0.0],
-        *-np.eye(4),
-    ]
+    rows = [[0.25, -60.0, -1 / 25, 9.0], [0.5, -90.0, -1 / 50, 3.0], [0.0, 0.0, 1.0, 0.0]]
+    rows += [*-np.eye(4)]
     qp = problem(np.zeros((4, 4)), [-0.75, 150.0, -1 / 50, 6.0], rows, [0, 0, 1, 0, 0, 0, 0])
     run = active_set(qp, np.zeros(4), [f"inequality {i}" for i in range(3, 7)])
     assert run.solution.objective == pytest.approx(-1 / 20)

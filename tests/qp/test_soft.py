@@ -35,9 +35,8 @@ def test_the_minimizer_is_that_of_the_objective_with_penalties(solver):
         x = cp.Variable(qp.n)
         penalty = qp.penalties[soft] @ cp.pos(qp.G[soft] @ x - qp.h[soft])
         cost = 0.5 * cp.quad_form(x, cp.psd_wrap(qp.H)) + qp.g @ x + penalty
-        cp.Problem(cp.Minimize(cost), [qp.A @ x == qp.b, qp.G[~soft] @ x <= qp.h[~soft]]).solve(
-            solver=cp.CLARABEL
-        )
+        rows = [qp.A @ x == qp.b, qp.G[~soft] @ x <= qp.h[~soft]]
+        cp.Problem(cp.Minimize(cost), rows).solve(solver=cp.CLARABEL)
         found = solve(qp, solver)
         assert np.allclose(found.x, x.value, atol=1e-5)
         excess = qp.G @ found.x - qp.h

@@ -94,9 +94,8 @@ def judges_qp(name, seed):
     robot = judges.load(name)
     limits = 0.4 * robot.torque_limits
     tasks = fb.standing_tasks(robot.standing())
-    controller = fb.WholeBodyController(
-        robot, judges.stance(robot, 0.5), tasks, torque_limits=limits, backend="reference"
-    )
+    options = {"torque_limits": limits, "backend": "reference"}
+    controller = fb.WholeBodyController(robot, judges.stance(robot, 0.5), tasks, **options)
     return controller.qp(robot.random_state(seed, 0.1))
 
 
@@ -198,9 +197,8 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver, scale):
         G = np.vstack([G, -rng.uniform(0.1, 1.0, meeting) @ G[:meeting]])
         h = np.append(h, G[-1] @ point)
         qp = QP(np.eye(n), scale * rng.normal(size=n), np.zeros((0, n)), [], G, h)
-        assert solve(qp, solver).residuals.inequality <= 10.0 * (
-            FEASIBILITY_TOLERANCE + 1e-12 * scale
-        ), seed
+        broken = solve(qp, solver).residuals.inequality
+        assert broken <= 10.0 * (FEASIBILITY_TOLERANCE + 1e-12 * scale), seed
 
 
 @pytest.mark.parametrize("solver", EXACT)
@@ -272,12 +270,9 @@ def exact_sum(A, x, b):
     rows = [
         [(Fraction(float(a)), v) for a, v in zip(row, fractions, strict=True) if a] for row in A
     ]
-    return np.array(
-        [
-            float(sum((a * v for a, v in row), Fraction(float(c))))
-            for row, c in zip(rows, b, strict=True)
-        ]
-    )
+    offsets = [Fraction(float(c)) for c in b]
+    sums = [sum((a * v for a, v in row), c) for row, c in zip(rows, offsets, strict=True)]
+    return np.array(sums, dtype=float)
 
 
 @pytest.mark.front_end
@@ -295,9 +290,7 @@ def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method():
         answered.add(found.solver)
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
         assert residual_torque(found) < LAST_DIGITS
-    assert "active_set" in answered, (
-        "DAQP managed: these states no longer try what this test is about"
-    )
+    assert "active_set" in answered, "DAQP managed: these states no longer try what this tests"
 
 
 def test_small_force_weights_do_not_make_a_problem_infeasible():
@@ -306,12 +299,8 @@ def test_small_force_weights_do_not_make_a_problem_infeasible():
     """
     robot = judges.load("solo12")
     at = robot.standing()
-    tasks = [
-        fb.CoMTask(at.com, weight=100.0),
-        fb.PostureTask(at.q),
-        fb.ForceTask(weight=1e-9),
-        fb.TorqueTask(weight=1e-9),
-    ]
+    tasks = [fb.CoMTask(at.com, weight=100.0), fb.PostureTask(at.q)]
+    tasks += [fb.ForceTask(weight=1e-9), fb.TorqueTask(weight=1e-9)]
     answered = set()
     # ten states for each share, and more until DAQP has failed once
     for seed, share in ((seed, share) for seed in range(60) for share in (0.4, 1.3)):
@@ -333,9 +322,7 @@ def test_small_force_weights_do_not_make_a_problem_infeasible():
         steepest = max(np.max(np.abs(slope)) for slope in slopes)
         flattest = np.linalg.eigvalsh(qp.reduced.H)[0]
         assert residual_torque(found) < np.finfo(float).eps * steepest / flattest
-    assert "active_set" in answered, (
-        "DAQP managed: these states no longer try what this test is about"
-    )
+    assert "active_set" in answered, "DAQP managed: these states no longer try what this tests"
 
 
 def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(monkeypatch):

@@ -169,10 +169,8 @@ class Notebook:
         widget.send = lambda content, buffers=None: self._send(
             widget.model_id, content, buffers or []
         )
-        widget.observe(
-            lambda _: self._send(widget.model_id, {"trait": "is_live", "value": False}, []),
-            names="is_live",
-        )
+        over = {"trait": "is_live", "value": False}
+        widget.observe(lambda _: self._send(widget.model_id, over, []), names="is_live")
         state = {name: getattr(widget, name) for name in ("version", "name", "height", "is_live")}
         thumbnail = base64.b64encode(widget.thumbnail).decode()
         page.evaluate(

@@ -36,9 +36,8 @@ def test_a_page_has_what_is_shown(page, viewer, standing, contacts, forces):
 
     viewer.show(standing, com=False, title="bare")
     settle(page, "bare")
-    assert (
-        page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'measured']).children)") == []
-    )
+    measured = "viewer.scene_tree.find(['meshcat', 'measured'])"
+    assert page.evaluate(f"Object.keys({measured}.children)") == []
     page.wait_for_timeout(1500)  # the legend keeps an entry for a second
     image = picture(page, "go2_bare")
     for colour in (MEASURED, WARNING, ALARM, COM):

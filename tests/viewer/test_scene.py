@@ -88,11 +88,8 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
 
 def test_the_colour_of_a_cone_shows_where_its_force_is(viewer, standing, contacts, forces):
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
-    for shown in (
-        {"forces": forces},
-        {"planned": forces},
-        {"forces": forces, "planned": np.tile([0, 0, 30.0], 4)},
-    ):
+    upwards = np.tile([0, 0, 30.0], 4)
+    for shown in ({"forces": forces}, {"planned": forces}, {"forces": forces, "planned": upwards}):
         viewer.show(standing, contacts, **shown)
         assert colours(viewer, "/meshcat/cone/") == expected, shown
     viewer.show(standing, contacts, forces=-forces)
@@ -225,11 +222,8 @@ def test_a_change_sends_only_what_changed(viewer, standing, contacts, forces):
 
 
 # the same few paths in many spellings, some below others
-PATHS = (
-    st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4)
-    .map("/".join)
-    .filter(lambda path: path.strip("/"))
-)
+PARTS = st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4)
+PATHS = PARTS.map("/".join).filter(lambda path: path.strip("/"))
 ITEMS = st.builds(
     Item,
     st.sampled_from([shapes.label([0.0, 0.0, 0.0], text, 0.1).shape for text in "xy"]),

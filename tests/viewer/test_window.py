@@ -104,11 +104,8 @@ def test_the_window_listens_on_loopback_only(window):
 
 def listening():
     """The ports that this process listens on."""
-    return {
-        found.laddr.port
-        for found in psutil.Process().net_connections("inet")
-        if found.status == psutil.CONN_LISTEN
-    }
+    found = psutil.Process().net_connections("inet")
+    return {one.laddr.port for one in found if one.status == psutil.CONN_LISTEN}
 
 
 def test_a_picture_has_a_port_only_after_its_address_is_read(viewer, standing, tmp_path):
