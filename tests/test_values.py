@@ -84,8 +84,8 @@ def test_every_public_class_is_tested_here_or_no_value():
     assert sorted(set(classes) - protocols) == sorted(
         {*excused, *(name for name in values() if name in classes)}
     )
-    shared = classes.keys() & values().keys()
-    assert [name for name in shared if type(values()[name]) is not classes[name]] == []
+    made = {name: type(value) for name, value in values().items()}
+    assert [name for name, found in classes.items() if made.get(name, found) is not found] == []
 
 
 def test_no_array_and_no_attribute_of_a_value_can_be_written_to():

@@ -82,9 +82,7 @@ def test_progress_is_kept_and_shown(capsys):
 
 
 @pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])
-def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
-    tmp_path, monkeypatch, home, capsys
-):
+def test_a_place_that_cannot_be_written_costs_only_the_memory(tmp_path, monkeypatch, home, capsys):
     show_progress()
     assert "cannot be saved" not in capsys.readouterr().out
     (tmp_path / "file").write_text("")

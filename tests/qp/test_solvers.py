@@ -106,9 +106,8 @@ def test_every_solver_gives_the_controller_the_same_torques(name):
         reference = solve(qp, "active_set")
         for solver in solvers():
             found = solve(qp, solver)
-            assert np.allclose(
-                found["tau"], reference["tau"], atol=1e-8 if solver == "daqp" else 1e-3
-            ), solver
+            atol = 1e-8 if solver == "daqp" else 1e-3
+            assert np.allclose(found["tau"], reference["tau"], atol=atol), solver
             assert found.residuals.inequality < 10 * FEASIBILITY_TOLERANCE or solver not in EXACT
 
 
@@ -141,9 +140,8 @@ def test_every_solver_calls_an_objective_that_curves_downwards_not_convex(solver
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("gap", [1e-8, 1e-6, 1e-2, 1e4])
 def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver, gap):
-    qp = QP(
-        np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0]
-    )
+    G, h = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0]], [1.0, -1.0 - gap, 9.0]
+    qp = QP(np.eye(2), [1.0, 2.0], *NONE, G, h)
     with pytest.raises(InfeasibleError) as caught:
         solve(qp, solver)
     assert caught.value.constraints == ("inequality 0", "inequality 1")
@@ -206,9 +204,8 @@ def test_rows_through_one_point_leave_it_whatever_its_unit(solver, scale):
 def test_rows_that_meet_far_away_only_are_met_there_or_refused(solver, slope):
     """x ≤ -1 and slope y ≤ x: nearly parallel rows, which meet at y = -1 / slope."""
     try:
-        found = solve(
-            QP(np.eye(2), np.zeros(2), *NONE, [[1.0, 0.0], [-1.0, slope]], [-1.0, 0.0]), solver
-        )
+        qp = QP(np.eye(2), np.zeros(2), *NONE, [[1.0, 0.0], [-1.0, slope]], [-1.0, 0.0])
+        found = solve(qp, solver)
     except (InfeasibleError, SolverError):
         assert slope < 1e-4
     else:

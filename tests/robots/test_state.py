@@ -62,12 +62,10 @@ def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_deriva
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
         expected = judges.jacobian_of(lambda s: s.com, state)
         assert np.allclose(state.com_jacobian, expected, atol=1e-7)
-        assert np.allclose(
-            state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7
-        )
-        assert np.allclose(
-            state.com_drift, judges.drift_of(lambda s: s.com_jacobian, state), atol=1e-7
-        )
+        velocity = judges.derivative(lambda s: s.com, state, state.v)
+        assert np.allclose(state.com_velocity, velocity, atol=1e-7)
+        drift = judges.drift_of(lambda s: s.com_jacobian, state)
+        assert np.allclose(state.com_drift, drift, atol=1e-7)
 
 
 def test_base_velocity_is_given_in_the_base_frame():
@@ -117,10 +115,8 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name):
     parts = ("M", "h", "com", "com_velocity", "com_drift", "com_jacobian", "joint_transforms")
     questions = [attrgetter(part) for part in parts]
     for frame in ("base", robot.frames[-1]):
-        of_frame = (
-            methodcaller(ask, frame)
-            for ask in ("point", "frame_jacobian", "frame_velocity", "frame_drift")
-        )
+        asked = ("point", "frame_jacobian", "frame_velocity", "frame_drift")
+        of_frame = (methodcaller(ask, frame) for ask in asked)
         questions += [*of_frame, lambda s, frame=frame: s.frame_pose(frame).homogeneous]
     alone = [[ask(robot.random_state(seed)) for ask in questions] for seed in (5, 6)]
     rng = np.random.default_rng(0)
@@ -163,9 +159,8 @@ def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(name):
         data = robot.model.createData()
         return pin.computeCentroidalMomentum(robot.model, data, q, state.v).vector
 
-    rate = (
-        momentum(state.integrate(step * state.v)) - momentum(state.integrate(-step * state.v))
-    ) / (2.0 * step)
+    after, before = (state.integrate(way * step * state.v) for way in (1, -1))
+    rate = (momentum(after) - momentum(before)) / (2.0 * step)
     assert np.allclose(state.centroidal_matrix @ state.v, momentum(state.q), atol=1e-10)
     assert np.allclose(state.centroidal_drift, rate, atol=1e-5)
     linear = sum(inertia.mass for inertia in robot.model.inertias) * state.com_velocity

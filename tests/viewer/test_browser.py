@@ -120,9 +120,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ],
     ids=["WebGL", "DecompressionStream"],
 )
-def test_a_page_names_what_its_browser_lacks(
-    browser, viewer, standing, tmp_path, lacks, pages, words
-):
+def test_pages_name_what_browsers_lack(browser, viewer, standing, tmp_path, lacks, pages, words):
     viewer.show(standing)
     addresses = {"live": viewer.url, "file": viewer.save(tmp_path / "scene.html").as_uri()}
     page = browser.new_page(viewport=SMALL)

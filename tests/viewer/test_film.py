@@ -25,9 +25,8 @@ SOME = 20  # of 255: by which a pixel is another
 @pytest.fixture(scope="module")
 def view(request):
     robot = fb.load("go2")
-    controller = fb.WholeBodyController(
-        robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
-    )
+    tasks = fb.standing_tasks(robot.standing())
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
     run = fb.rollout(fb.Simulation(robot), controller, 0.2, [Push((0.0, 400.0, 0.0), 0.05, 0.1)])
     view = fb.Viewer(robot)
     view.play(run, speed=0.5, follow=False)

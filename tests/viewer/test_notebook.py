@@ -248,9 +248,7 @@ def displayed(notebook, page, viewer):
 
 
 @pytest.mark.front_end
-def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
-    notebook, page, standing
-):
+def test_pictures_share_code_and_one_that_lost_a_frame_gets_all_again(notebook, page, standing):
     viewer, *others = (Viewer(standing.robot, height=100) for _ in range(3))
     viewer.show(standing)
     frame, *_ = (displayed(notebook, page, view) for view in (viewer, *others))
@@ -302,9 +300,7 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(notebook, page,
 
 
 @pytest.mark.front_end
-def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
-    notebook, page, viewer, standing
-):
+def test_a_page_that_moves_while_a_cell_runs_loads_once(notebook, page, viewer, standing):
     frame = displayed(notebook, page, viewer.show(standing))
     viewer.show(standing, title="the second frame")
     frame.wait_for_function(f"{TITLE} == 'the second frame'")
@@ -337,9 +333,7 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
-def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
-    notebook, page, viewer, standing, how
-):
+def test_a_picture_outlives_its_kernel_or_window(notebook, page, viewer, standing, how):
     frame = displayed(notebook, page, viewer.show(standing))
     assert frame.evaluate(NOTICE) == "none"
     notebook.end() if how == "kernel" else viewer.close()
@@ -348,9 +342,7 @@ def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
     picture(page, f"notebook_without_{how}")
 
 
-def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
-    viewer, standing, monkeypatch
-):
+def test_an_output_has_the_widget_and_an_image_or_the_scene(viewer, standing, monkeypatch):
     viewer.show(standing)
     data, _ = viewer._repr_mimebundle_()
     assert set(data) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}

@@ -179,9 +179,7 @@ def on_its_feet(robot):
 
 
 @pytest.mark.parametrize("name", judges.sampled(catalogue(), "talos"))
-def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(
-    name, tmp_path
-):
+def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_to_less_than_two(name, tmp_path):
     robot = load(name)
     viewer, contacts = Viewer(robot), on_its_feet(robot)
     n = contacts.n_points

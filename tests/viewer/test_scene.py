@@ -71,9 +71,7 @@ def test_arrows_start_at_contacts(viewer, standing, contacts, forces, factor):
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
 @pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
-def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
-    viewer, go2, standing, normal, mu
-):
+def test_cones_open_by_mu_in_the_scale_of_the_forces(viewer, go2, standing, normal, mu):
     contacts = Contacts.points(go2, mu=mu, normals=normal)
     viewer.show(standing, contacts)
     cones = matrices(viewer, "/meshcat/cone/")

@@ -33,9 +33,7 @@ def differing(one, other):
     return int((np.abs(one - other).max(axis=2) > 24).sum())
 
 
-def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
-    viewer, standing, contacts, forces
-):
+def test_the_image_shows_all_of_the_scene_and_a_legend(viewer, standing, contacts, forces):
     empty = image(viewer)
     robot = image(viewer.show(standing, com=False))
     assert differing(empty, robot) > 0.05 * robot[..., 0].size
