@@ -1,7 +1,5 @@
 """Properties of `Affine` and `Quadratic`: composition, stacking, pullback, minimization."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,11 +13,11 @@ seeds = st.integers(0, 100_000)
 sizes = st.integers(1, 5)
 
 
-def affine(rng: np.random.Generator, n_out: int, n_in: int) -> fb.Affine:
+def affine(rng, n_out, n_in):
     return fb.Affine(rng.normal(size=(n_out, n_in)), rng.normal(size=n_out))
 
 
-def quadratic(rng: np.random.Generator, n: int) -> fb.Quadratic:
+def quadratic(rng, n):
     root = rng.normal(size=(n, n))
     return fb.Quadratic(root @ root.T + 0.1 * np.eye(n), rng.normal(size=n), float(rng.normal()))
 

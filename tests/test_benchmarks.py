@@ -1,7 +1,5 @@
 """Parts of the benchmarks: problems and processes of the comparison with peers, soaks, tables."""
 
-from __future__ import annotations
-
 import mmap
 import socket
 import sys

@@ -2,13 +2,10 @@
 host.
 """
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
@@ -26,7 +23,7 @@ pytestmark = [pytest.mark.front_end, needs_chromium, pytest.mark.timeout(600)]
 browser = browser_of_a_file
 
 
-def converted(lesson: Path, to: str, *options: str) -> None:
+def converted(lesson, to, *options):
     command = [sys.executable, "-m", "nbconvert", "--to", to, *options, str(lesson)]
     subprocess.run(command, check=True, capture_output=True, timeout=500)
 
@@ -45,7 +42,7 @@ def test_every_picture_of_a_converted_lesson_is_there(tmp_path, browser):
     converted(lesson, "html", WITHOUT_STATE)
     page, strangers = browser.new_page(), []
 
-    def block(route: Any) -> None:
+    def block(route):
         strangers.append(route.request.url)
         route.abort()
 

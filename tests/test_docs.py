@@ -1,10 +1,7 @@
 """The code of README and documentation runs and prints what the pages show."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -17,7 +14,7 @@ LINK = re.compile(r"\]\(((?!https?:)[^)#\s]+)")
 @pytest.mark.parametrize("page", WITH_CODE, ids=lambda page: page.stem)
 def test_the_code_of_a_page_prints_the_output_of_the_page(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    names: dict[str, Any] = {"__name__": "page"}
+    names = {"__name__": "page"}
     text = page.read_text(encoding="utf-8")
     for language, block in re.findall(r"^```(python|text)\n(.*?)^```$", text, re.M | re.S):
         if language == "text":

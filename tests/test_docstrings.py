@@ -1,13 +1,9 @@
 """Docstrings of public names follow NumPy's form: parameters, types, shapes and units."""
 
-from __future__ import annotations
-
 import doctest
 import inspect
 import re
-from collections.abc import Iterator
 from importlib import import_module
-from typing import Any
 
 import pytest
 from numpydoc.docscrape import NumpyDocString
@@ -22,7 +18,7 @@ UNIT = re.compile(r"\[[^\]]+\]|dimensionless")
 ARRAY = re.compile(r"\b(Array|ArrayLike)\b")
 
 
-def public(package: str) -> Iterator[tuple[str, Any]]:
+def public(package):
     """Full name and value of every public function, class and member of a package."""
     for name, value in exported(package):
         if not (inspect.isclass(value) or inspect.isroutine(value)):
@@ -39,7 +35,7 @@ def public(package: str) -> Iterator[tuple[str, Any]]:
                 yield f"{package}.{name}.{member}", getattr(value, member)
 
 
-def annotations(value: Any) -> dict[str, str]:
+def annotations(value):
     """Annotation of each parameter of a function or constructor, as the source has it."""
     try:
         parameters = inspect.signature(value).parameters.values()

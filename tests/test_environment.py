@@ -1,7 +1,5 @@
 """A wheel is complete, and importing the package stays light."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

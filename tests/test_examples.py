@@ -1,7 +1,5 @@
 """The programs in examples/ run, and wbc.py computes what the library computes."""
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import io

@@ -1,13 +1,10 @@
 """A file is written whole or not at all, whatever ends the writing."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -61,7 +58,7 @@ def test_a_pipe_is_written_and_not_replaced(linked, tmp_path):
     pipe, link = tmp_path / "pipe", tmp_path / "link"
     os.mkfifo(pipe)
     link.symlink_to(pipe)
-    received: list[bytes] = []
+    received = []
     reader = threading.Thread(target=lambda: received.append(pipe.read_bytes()), daemon=True)
     reader.start()
     write_table([], link if linked else pipe)  # such as --table /dev/stdout
@@ -76,7 +73,7 @@ def test_two_files_of_one_folder_can_be_written_at_once(tmp_path):
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "a", "b": "b"}
 
 
-def no_space(*_: object) -> None:
+def no_space(*_):
     raise OSError(28, "No space left on device")
 
 
@@ -92,7 +89,7 @@ def test_a_picture_that_fails_leaves_all_other_files(extension, linked, tmp_path
     if linked:
         target.symlink_to(former)
 
-    def pictures(*_: object) -> Iterator[Image.Image]:
+    def pictures(*_):
         if broken and extension == ".png":
             no_space()
         yield Image.new("RGB", (320, 200), "red")

@@ -1,7 +1,5 @@
 """Shared geometry, against finite differences, samples and Pinocchio."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import pytest

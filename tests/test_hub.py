@@ -15,7 +15,6 @@ import signal
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Iterator
 from contextlib import ExitStack
 from http.client import HTTPException
 from pathlib import Path
@@ -96,28 +95,28 @@ class Hub(NamedTuple):
     folder: Path
     process: psutil.Process
 
-    def kernels(self, student: str) -> list[psutil.Process]:
+    def kernels(self, student):
         """The kernels of a student."""
         home = str(self.folder / student)
         children = self.process.children(recursive=True)
         kernels = [child for child in children if "ipykernel_launcher" in " ".join(child.cmdline())]
         return [kernel for kernel in kernels if kernel.environ().get("HOME") == home]
 
-    def ports(self, student: str) -> list[int]:
+    def ports(self, student):
         """The ports that the processes of a student listen on, without those of kernels."""
         home = str(self.folder / student)
         servers = [one for one in self.process.children() if one.environ().get("HOME") == home]
         return [port for server in servers for port in listening(server)]
 
 
-def listening(process: psutil.Process) -> list[int]:
+def listening(process):
     """The ports that a process listens on."""
     found = process.net_connections("inet")
     return [one.laddr.port for one in found if one.status == psutil.CONN_LISTEN]
 
 
 @pytest.fixture(scope="module")
-def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hub]:
+def hub(tmp_path_factory):
     """A hub that has started."""
     folder = tmp_path_factory.mktemp("hub")
     address, *others = free_ports(3)
@@ -156,7 +155,7 @@ browser = browser_of_a_file
 
 
 @pytest.fixture(scope="module")
-def class_(hub: Hub, browser: Any) -> Iterator[list[Student]]:
+def class_(hub, browser):
     """Two students log in and start at once, each in their own browser, and run lesson 00."""
     with ExitStack() as ends:
         students = []
@@ -175,7 +174,7 @@ def class_(hub: Hub, browser: Any) -> Iterator[list[Student]]:
         yield students
 
 
-def _log_in(page: Any, address: str, name: str) -> None:
+def _log_in(page, address, name):
     page.goto(f"{address}/hub/login?next=%2Fhub%2Fspawn")
     page.fill("#username_input", name)
     page.fill("#password_input", "a-test")

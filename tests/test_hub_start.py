@@ -1,7 +1,5 @@
 """What the hub's configuration does when a student's server starts and ends; no hub is needed."""
 
-from __future__ import annotations
-
 import os
 import runpy
 import subprocess

@@ -9,12 +9,8 @@ What the lessons compute is test_notebooks' business, what all other sliders do 
 both need no browser.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
 
 import nbformat
 import pytest
@@ -63,7 +59,7 @@ SETTINGS = {
 
 
 @pytest.fixture(scope="module")
-def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def course(tmp_path_factory):
     """A course of these lessons, prepared for a learner: without outputs, so that what is seen was
     made here.
     """
@@ -75,7 +71,7 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def lab(course: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def lab(course, tmp_path_factory):
     """The address of a JupyterLab for that learner."""
     home = tmp_path_factory.mktemp("home")
     for name, setting in SETTINGS.items():
@@ -118,7 +114,7 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
         page.close()
 
 
-def _change(lesson: Path) -> None:
+def _change(lesson):
     notebook = read_notebook(lesson)
     notebook.cells[0].source += "."
     nbformat.write(notebook, lesson)

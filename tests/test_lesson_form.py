@@ -1,14 +1,9 @@
 """The form of the lessons: question, prediction, computed answer, reason, claims."""
 
-from __future__ import annotations
-
 import ast
 import re
-from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 from string import ascii_lowercase
-from typing import Any
 
 import pytest
 
@@ -24,32 +19,32 @@ QUESTION = re.compile(r"\*\*Predict( [^*]*)?\*\*:")
 
 
 @cache
-def cells(path: Path) -> list[Any]:
+def cells(path):
     return list(read_notebook(path).cells)
 
 
-def tagged(cell: Any, tag: str) -> bool:
+def tagged(cell, tag):
     return tag in cell.metadata.get("tags", [])
 
 
-def code(path: Path) -> list[Any]:
+def code(path):
     return [cell for cell in cells(path) if cell.cell_type == "code"]
 
 
-def asked(cell: Any) -> list[str]:
+def asked(cell):
     """Names of the questions that a text asks."""
     found = QUESTION.findall(cell.source) if cell.cell_type == "markdown" else []
     return [name.strip() for name in found]
 
 
-def calls(cell: Any, function: str) -> list[ast.Call]:
+def calls(cell, function):
     """The calls of that function in a cell of code."""
     nodes = ast.walk(ast.parse(cell.source)) if cell.cell_type == "code" else ()
     found = [node for node in nodes if isinstance(node, ast.Call)]
     return [call for call in found if ast.unparse(call.func) == function]
 
 
-def named(path: Path, function: str) -> list[tuple[int, str]]:
+def named(path, function):
     """Where a lesson calls `predict` or `compare`, and the names it gives."""
     return [
         (i, ast.literal_eval(call.args[0]))
@@ -58,18 +53,18 @@ def named(path: Path, function: str) -> list[tuple[int, str]]:
     ]
 
 
-def asserts(cell: Any) -> bool:
+def asserts(cell):
     return cell.cell_type == "code" and any(
         isinstance(node, ast.Assert) for node in ast.walk(ast.parse(cell.source))
     )
 
 
-def is_typed(value: ast.expr) -> bool:
+def is_typed(value):
     """Whether an expression is an answer that somebody typed: there is no name in it."""
     return not any(isinstance(node, ast.Name) for node in ast.walk(value))
 
 
-def taught(path: Path) -> Iterator[tuple[set[str], set[str]]]:
+def taught(path):
     """For every text of a lesson, the equations that it says it teaches and those that it writes
     out with their number.
     """
@@ -188,7 +183,7 @@ def test_all_lessons_except_the_first_begin_with_recall(path):
 
 
 @cache
-def the_map() -> str:
+def the_map():
     return equations.table()
 
 

@@ -1,16 +1,12 @@
 """The lessons as files: they print their stored outputs, and their exercises can be solved."""
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import json
 import os
 import re
 import time
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import nbformat
 import psutil
@@ -30,20 +26,20 @@ LIMIT = 25.0
 
 
 @pytest.fixture(scope="module")
-def lessons() -> Iterator[LessonRunner]:
+def lessons():
     """The program that runs the lessons. The processes of a lesson carry its mark."""
     runner = LessonRunner(mark=str(os.getpid()))
     yield runner
     runner.stop()
 
 
-def ids(path: Path) -> str:
+def ids(path):
     return path.stem
 
 
-def left_behind(runner: LessonRunner) -> list[str]:
+def left_behind(runner):
     """Processes with the mark that outlive their lesson, whoever their parent is now."""
-    found: list[str] = []
+    found = []
     for _ in range(50):  # those about to end may take 5 s to do so
         found = []
         for process in psutil.process_iter():
@@ -78,7 +74,7 @@ Path("grades.json").write_text(json.dumps({one.exercise: one.result for one in _
 """
 
 
-def followed_by_its_learner(path: Path) -> Any:
+def followed_by_its_learner(path):
     """A lesson, and after it what a learner would do: predict, solve all exercises, hand in."""
     notebook, answers = read_notebook(path), with_solutions(read_notebook(path)).cells
     after = [
@@ -100,11 +96,11 @@ def followed_by_its_learner(path: Path) -> Any:
     return notebook
 
 
-def checks(cells: list[Any]) -> list[Any]:
+def checks(cells):
     return [cell for cell in cells if "check" in cell.metadata.get("tags", [])]
 
 
-def with_an_answer(source: str) -> str:
+def with_an_answer(source):
     """A prediction's cell with some answer in place of its ...."""
     call = next(node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
     given = {part.arg: ast.literal_eval(part.value) for part in call.keywords}
@@ -141,7 +137,7 @@ def test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything(
     assert right == solved_now, grades
 
 
-def lines_after_imports(source: str) -> int:
+def lines_after_imports(source):
     imports = [n for n in ast.parse(source).body if isinstance(n, ast.Import | ast.ImportFrom)]
     return len(source.splitlines()) - sum(n.end_lineno - n.lineno + 1 for n in imports)
 

@@ -2,17 +2,12 @@
 found by its search.
 """
 
-from __future__ import annotations
-
 import html
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
 from functools import cache
 from html.parser import HTMLParser
-from pathlib import Path
-from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import nbformat
@@ -42,7 +37,7 @@ browser = browser_of_a_file
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory):
     """A site of two lessons, as stored; the picture of its first page is run. Faults of Sphinx end
     it with an error.
     """
@@ -60,14 +55,14 @@ class Page(HTMLParser):
     browser fetches.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         super().__init__()
         self.links, self.loaded, self.names = set[str](), set[str](), set[str]()
-        self.alts: list[str] = []
+        self.alts = []
         self.described = False
         self.feed(path.read_text(encoding="utf-8"))
 
-    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attributes):
         given = dict(attributes)
         self.names.add(given.get("id") or "")
         self.described |= tag == "meta" and given.get("name") == "description"
@@ -81,11 +76,11 @@ class Page(HTMLParser):
 
 
 @cache
-def page_at(path: Path) -> Page:
+def page_at(path):
     return Page(path)
 
 
-def pages(folder: Path) -> Iterator[Path]:
+def pages(folder):
     return (path for path in sorted(folder.rglob("*.html")) if "_static" not in path.parts)
 
 
@@ -134,7 +129,7 @@ def test_equations_and_functions_lead_to_each_other(built):
     assert {anchor(number) for number in equations.TITLES} <= map_page.names
 
 
-def anchor(number: str) -> str:
+def anchor(number):
     return f"app-{number[-1].lower()}" if number.startswith("App") else f"eq-{number.strip('()')}"
 
 
@@ -230,7 +225,7 @@ def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path):
 
 
 class NoPictures:
-    def place(self, data: Mapping[str, Any]) -> str | None:
+    def place(self, data):
         return "<b>a scene</b>" if "scene" in data else None
 
 

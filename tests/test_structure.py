@@ -73,16 +73,16 @@ class Import(NamedTuple):
     name: str | None
 
 
-def relative(path: Path) -> str:
+def relative(path):
     return path.relative_to(ROOT).as_posix()
 
 
-def layer(path: Path) -> int:
+def layer(path):
     return LAYER_OF[path.relative_to(PACKAGE).parts[0].removesuffix(".py")]
 
 
 @cache
-def file_of(module: str) -> Path | None:
+def file_of(module):
     """The file of a module of the package."""
     folder = ROOT.joinpath(*module.split("."))
     files = (folder / "__init__.py", folder.with_suffix(".py"))
@@ -90,7 +90,7 @@ def file_of(module: str) -> Path | None:
 
 
 @cache
-def parsed(path: Path) -> ast.Module:
+def parsed(path):
     source = path.read_text(encoding="utf-8")
     if path.suffix == ".ipynb":
         source = "\n".join(
@@ -102,18 +102,15 @@ def parsed(path: Path) -> ast.Module:
 
 
 @cache
-def nodes(path: Path) -> list[ast.AST]:
+def nodes(path):
     return list(ast.walk(parsed(path)))
 
 
 @cache
-def imports(path: Path) -> list[Import]:
+def imports(path):
     """All imports of the package's modules at run time, also inside functions."""
-    blocks = [
-        node
-        for node in nodes(path)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-    ]
+    branches = [node for node in nodes(path) if isinstance(node, ast.If)]
+    blocks = [node for node in branches if "TYPE_CHECKING" in ast.unparse(node.test)]
     for_types = {inner for block in blocks for line in block.body for inner in ast.walk(line)}
     found = []
     for node in nodes(path):
@@ -127,15 +124,12 @@ def imports(path: Path) -> list[Import]:
                 # `from floatbase import viewer` imports a module, `from floatbase import Viewer`
                 # a name
                 inner, outer = f"{node.module}.{name}", str(node.module)
-                found.append(
-                    Import(node.lineno, inner, None)
-                    if file_of(inner)
-                    else Import(node.lineno, outer, name)
-                )
+                target = (inner, None) if file_of(inner) else (outer, name)
+                found.append(Import(node.lineno, *target))
     return [one for one in found if one.module.split(".")[0] == "floatbase"]
 
 
-def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+def circles(graph):
     """Sets of files that import one another, directly or not."""
     reachable = {node: set(targets) for node, targets in graph.items()}
     for middle in graph:  # Warshall's algorithm
@@ -210,7 +204,7 @@ def test_packages_are_imported_by_their_public_names():
 
 
 @cache
-def public_names(package: str) -> list[str]:
+def public_names(package):
     """Return the names in `__all__` or, as in a lesson, the names that `__init__` imports."""
     listed = getattr(import_module(package), "__all__", None)
     if listed is None:
@@ -220,7 +214,7 @@ def public_names(package: str) -> list[str]:
     return list(listed)
 
 
-def top_folder(path: Path) -> Path:
+def top_folder(path):
     return PACKAGE / path.relative_to(PACKAGE).parts[0]
 
 
@@ -236,7 +230,7 @@ def test_only_robot_state_and_standing_import_one_another():
     assert not others, "\n".join(others)
 
 
-def docstring_lines(tree: ast.Module) -> int:
+def docstring_lines(tree):
     """Count the lines of all docstrings of a module."""
     strings = [
         node.body[0]
@@ -255,11 +249,8 @@ def test_modules_are_short_documented_and_finished():
             wrong.append(f"{relative(path)} has {count} lines without docstrings")
         if not ast.get_docstring(parsed(path)):
             wrong.append(f"{relative(path)} has no docstring")
-        wrong += [
-            f"{relative(path)} contains {word}"
-            for word in ("TODO", "FIXME", "XXX")
-            if word in source
-        ]
+        words = [word for word in ("TODO", "FIXME", "XXX") if word in source]
+        wrong += [f"{relative(path)} contains {word}" for word in words]
     assert not wrong, "\n".join(wrong)
 
 
@@ -311,7 +302,7 @@ def test_tests_use_public_names():
     assert not wrong, "\n".join(wrong)
 
 
-def private_names_of_others(path: Path, own_names: set[str]) -> list[str]:
+def private_names_of_others(path, own_names):
     """Private attributes and imports of a module whose names its own package does not define."""
     found = []
     for node in ast.walk(parsed(path)):
@@ -330,7 +321,7 @@ def private_names_of_others(path: Path, own_names: set[str]) -> list[str]:
     return found
 
 
-def defined_names(path: Path) -> set[str]:
+def defined_names(path):
     """All names that a module defines: functions, classes, variables and attributes."""
     names = set()
     for node in ast.walk(parsed(path)):
@@ -341,8 +332,8 @@ def defined_names(path: Path) -> set[str]:
     return names
 
 
-def test_no_package_uses_private_names_of_another_package() -> None:
-    names: dict[Path, set[str]] = {}
+def test_no_package_uses_private_names_of_another_package():
+    names = {}
     for path in LAYERED:
         names.setdefault(top_folder(path), set()).update(defined_names(path))
     wrong = [
@@ -353,7 +344,7 @@ def test_no_package_uses_private_names_of_another_package() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_private_names_of_another_package_are_found(tmp_path: Path) -> None:
+def test_private_names_of_another_package_are_found(tmp_path):
     path = tmp_path / "module.py"
     path.write_text(
         "from a import _b\nsim._c\nself._d\nwalk._own._own\nsim.made()._e\nx.__name__\n"
@@ -362,7 +353,7 @@ def test_private_names_of_another_package_are_found(tmp_path: Path) -> None:
     assert found == ["1 imports _b", "2 uses sim._c", "5 uses sim.made()._e"]
 
 
-def is_private(name: str) -> bool:
+def is_private(name):
     """Whether a name is internal; `_repr_html_` and `__main__` are agreed with others."""
     return name.startswith("_") and not name.endswith("_")
 
@@ -375,11 +366,11 @@ SET_METHODS = {"difference", "intersection", "symmetric_difference", "union"}
 SET_TYPES = {"AbstractSet", "Set", "frozenset", "set"}
 
 
-def is_set_type(annotation: ast.expr | None) -> bool:
+def is_set_type(annotation):
     return annotation is not None and ast.unparse(annotation).split("[")[0] in SET_TYPES
 
 
-def is_set(node: ast.expr, known: set[str]) -> bool:
+def is_set(node, known):
     """Whether an expression is a set, as far as its text tells.
 
     known: names of variables that hold sets, and of functions that return sets.
@@ -401,7 +392,7 @@ def is_set(node: ast.expr, known: set[str]) -> bool:
     return False
 
 
-def sets_in_order(tree: ast.Module, returning: set[str]) -> list[ast.expr]:
+def sets_in_order(tree, returning):
     """Sets whose order a module uses: in a loop, a list, a dictionary or an unpacked argument.
 
     returning: names of functions that return sets, such as "flat_foot_names()".
@@ -411,7 +402,7 @@ def sets_in_order(tree: ast.Module, returning: set[str]) -> list[ast.expr]:
     inner = {id(node) for function in functions for node in ast.walk(function)} - {
         id(function) for function in functions
     }
-    scopes: list[list[ast.AST]] = [list(ast.walk(function)) for function in functions]
+    scopes = [list(ast.walk(function)) for function in functions]
     scopes.append([node for node in ast.walk(tree) if id(node) not in inner])
     for nodes in scopes:
         known = set(returning)
@@ -430,7 +421,7 @@ def sets_in_order(tree: ast.Module, returning: set[str]) -> list[ast.expr]:
             id(entry) for node in nodes if isinstance(node, ast.Set) for entry in node.elts
         }
         for node in nodes:
-            uses: list[ast.expr] = []
+            uses = []
             if isinstance(node, ast.For):
                 uses = [node.iter]
             elif isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp):

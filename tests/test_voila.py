@@ -4,9 +4,6 @@ The browser reaches Voilà's own address and nothing else. Its own template asks
 and does without them.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from importlib.util import find_spec
 
 import nbformat
@@ -43,7 +40,7 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def voila(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def voila(tmp_path_factory):
     """The address of a Voilà that serves lesson 00 with a playground at its end."""
     home = tmp_path_factory.mktemp("voila")
     lesson = read_notebook(NOTEBOOKS / "00_start_here.ipynb")

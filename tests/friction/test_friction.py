@@ -1,10 +1,7 @@
 """Components of a force, the exact cone, its projection, and the facets and edges of polyhedra."""
 
-from __future__ import annotations
-
 import cvxpy as cp
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from floatbase.errors import InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
 
-Array = npt.NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])
 
 seeds = st.integers(0, 100_000)
@@ -23,12 +19,12 @@ facets = st.integers(3, 32)
 mus = st.floats(0.05, 3.0)
 
 
-def any_normal(rng: np.random.Generator) -> Array:
+def any_normal(rng):
     raw = rng.normal(size=3)
     return raw / np.linalg.norm(raw)
 
 
-def any_force(rng: np.random.Generator) -> Array:
+def any_force(rng):
     """Return a force of any direction, from 1 mN to 10 kN."""
     return rng.normal(size=3) * 10.0 ** rng.uniform(-3, 4)
 
@@ -90,13 +86,9 @@ def test_the_area_ratio_follows_the_number_of_facets(seed, n, mu, inside):
 
 
 def test_four_facets_keep_64_percent_of_the_cone_and_sixteen_97():
-    expected = [0.64, 0.90, 0.97]
-    assert [round(FrictionPolyhedron(UP, 0.7, n).area_ratio, 2) for n in (4, 8, 16)] == expected
-    assert [round(FrictionPolyhedron(UP, 0.7, n, False).area_ratio, 2) for n in (4, 8, 16)] == [
-        1.27,
-        1.05,
-        1.01,
-    ]
+    for inside, expected in ((True, [0.64, 0.90, 0.97]), (False, [1.27, 1.05, 1.01])):
+        cones = [FrictionPolyhedron(UP, 0.7, n, inside) for n in (4, 8, 16)]
+        assert [round(cone.area_ratio, 2) for cone in cones] == expected
 
 
 @settings(max_examples=25)
@@ -135,15 +127,12 @@ def test_an_inside_polyhedron_is_left_before_the_cone_and_an_outside_one_after_i
     force = [5.0, 0.0, 10.0]
     inner = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=True)
     outer = FrictionPolyhedron(UP, 0.6, 4, inner_approximation=False)
-    assert (inner.status(force), FrictionCone(UP, 0.6).status(force), outer.status(force)) == (
-        "outside",
-        "inside",
-        "inside",
-    )
+    found = [cone.status(force) for cone in (inner, FrictionCone(UP, 0.6), outer)]
+    assert found == ["outside", "inside", "inside"]
     assert (inner.active_facets(force), outer.active_facets(force)) == ((0,), ())
 
 
-def slips(force: Array, normal: Array, mu: float) -> float:
+def slips(force, normal, mu):
     """Return α∥ - μ α⊥ of (28) in N: how far a force lies outside the exact cone."""
     pressing = float(normal @ force)
     return float(np.linalg.norm(force - pressing * normal)) - mu * pressing
@@ -177,9 +166,8 @@ def test_the_inner_polyhedron_reaches_mu_at_its_edges_and_loses_cos_pi_over_n_be
         assert slips(ray, normal, mu) == pytest.approx(0.0, abs=1e-9)
     for direction in inner.face_matrix + inner.mu_facet * normal:
         assert np.linalg.norm(direction) == pytest.approx(1.0)
-        assert inner.margin(normal + mu * np.cos(np.pi / n) * direction) == pytest.approx(
-            0.0, abs=1e-9
-        )
+        between = normal + mu * np.cos(np.pi / n) * direction
+        assert inner.margin(between) == pytest.approx(0.0, abs=1e-9)
         assert outer.margin(normal + mu * direction) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -207,9 +195,8 @@ def test_turned_facets_are_the_facets_turned_about_the_normal(seed, n, mu, insid
     expected = straight.rays @ about.T
     assert np.allclose(turned.rays, expected, rtol=0, atol=1e-9 * size / np.cos(np.pi / n))
     whole = FrictionPolyhedron(normal, mu, n, inside, turn + 2 * np.pi / n)
-    assert np.allclose(
-        np.roll(turned.face_matrix, -1, axis=0), whole.face_matrix, rtol=0, atol=1e-9 * size
-    )
+    next_faces = np.roll(turned.face_matrix, -1, axis=0)
+    assert np.allclose(next_faces, whole.face_matrix, rtol=0, atol=1e-9 * size)
 
 
 @given(seeds)
@@ -220,7 +207,7 @@ def test_tangents_are_right_handed_with_the_normal(seed):
     assert np.allclose([t1 @ t1, t2 @ t2, t1 @ t2, t1 @ normal], [1.0, 1.0, 0.0, 0.0], atol=1e-12)
 
 
-def nearest_in_cone() -> tuple[cp.Problem, cp.Parameter, cp.Parameter, cp.Parameter, cp.Variable]:
+def nearest_in_cone():
     """Return the projection onto the exact second-order cone, written for any normal and μ."""
     x, f = cp.Variable(3), cp.Parameter(3)
     tangential, pressing = cp.Parameter((3, 3)), cp.Parameter(3)
@@ -241,9 +228,8 @@ def test_the_projection_is_the_nearest_force_that_cvxpy_finds_in_the_exact_cone(
         assert np.allclose(found, x.value, atol=2e-5)
         # cvxpy stops within its tolerance: our result must not be farther away
         assert np.linalg.norm(found - f.value) <= np.linalg.norm(x.value - f.value) + 1e-7
-        cases.add(
-            "inside" if np.array_equal(found, f.value) else "surface" if np.any(found) else "apex"
-        )
+        inside = np.array_equal(found, f.value)
+        cases.add("inside" if inside else "surface" if np.any(found) else "apex")
     assert cases == {"inside", "surface", "apex"}
 
 

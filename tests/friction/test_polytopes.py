@@ -1,9 +1,6 @@
 """Facets from rays and vertices from extreme points, also if the set is flat or contains lines."""
 
-from __future__ import annotations
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,11 +9,10 @@ from scipy.spatial import ConvexHull
 
 from floatbase.friction._polytopes import cone_face_matrix, polytope_vertices
 
-Array = npt.NDArray[np.float64]
 seeds = st.integers(0, 100_000)
 
 
-def made_of(rays: Array, x: Array) -> bool:
+def made_of(rays, x):
     return bool(nnls(rays, x)[1] < 1e-9 * np.linalg.norm(x))
 
 
@@ -57,7 +53,7 @@ def test_a_half_space_has_one_row_and_the_whole_space_none():
     assert E.shape == (0, 3)
 
 
-def points_of(rng: np.random.Generator, n: int, rank: int) -> Array:
+def points_of(rng, n, rank):
     """Return random points in R^n that lie in an affine space of dimension rank."""
     return rng.normal(size=(12, rank)) @ rng.normal(size=(rank, n)) + rng.normal(size=n)
 
@@ -73,11 +69,8 @@ def test_vertices_are_those_of_the_hull_whatever_its_dimension(seed, n, rank):
         return
     basis = np.linalg.svd(points - points[0])[2][:rank].T
     flat = (points - points[0]) @ basis
-    expected = (
-        {int(np.argmin(flat)), int(np.argmax(flat))}
-        if rank == 1
-        else set(ConvexHull(flat).vertices.tolist())
-    )
+    ends = {int(np.argmin(flat)), int(np.argmax(flat))}
+    expected = ends if rank == 1 else set(ConvexHull(flat).vertices.tolist())
     assert {int(np.argmin(np.linalg.norm(points - x, axis=1))) for x in found} == expected
     assert len(found) == len(expected)
 

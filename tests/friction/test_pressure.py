@@ -1,7 +1,5 @@
 """Centre of pressure and wrench of a sole: by definition, and against MuJoCo's contact forces."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -17,7 +15,7 @@ TALOS = judges.load("talos")
 SOLES = judges.stance(TALOS)
 
 
-def loads(seed: int) -> np.ndarray:
+def loads(seed):
     """Return forces at the corners of both soles that push up, shape (8, 3), N."""
     rng = np.random.default_rng(seed)
     return np.column_stack([rng.normal(0.0, 20.0, (8, 2)), rng.uniform(0.0, 200.0, 8)])
@@ -28,9 +26,8 @@ def test_about_the_centre_of_pressure_there_is_no_tangential_moment(seed):
     state, forces = TALOS.standing(), loads(seed)
     for contacts, part in ((SOLES, forces), (SOLES.only("left_sole_link"), forces[:4])):
         centre = centre_of_pressure(state, contacts, part)
-        assert np.allclose(
-            contact_wrench(state, contacts, part, centre)[3:5], 0.0, atol=1e-9 * TALOS.weight
-        )
+        tilting = contact_wrench(state, contacts, part, centre)[3:5]
+        assert np.allclose(tilting, 0.0, atol=1e-9 * TALOS.weight)
         middle = state.point("left_sole_link")
         f, tau = np.split(contact_wrench(state, contacts, part.ravel(), middle), 2)
         assert np.allclose(middle + [-tau[1] / f[2], tau[0] / f[2], 0.0], centre, atol=1e-9)
@@ -49,9 +46,8 @@ def test_the_ground_pushes_where_the_controller_planned():
     state = TALOS.standing()
     target = state.com + [0.02, 0.01, 0.0]
     tasks = [fb.CoMTask(target), *fb.standing_tasks(state)[1:]]
-    run = fb.rollout(
-        fb.Simulation(TALOS), fb.WholeBodyController(TALOS, SOLES, tasks), 2.0, control_period=2e-3
-    )
+    controller = fb.WholeBodyController(TALOS, SOLES, tasks)
+    run = fb.rollout(fb.Simulation(TALOS), controller, 2.0, control_period=2e-3)
     planned, measured = (
         centre_of_pressure(run.final, SOLES, forces[-1]) for forces in (run.planned, run.measured)
     )
@@ -64,7 +60,6 @@ def test_without_pressure_there_is_no_centre():
     state = TALOS.standing()
     refused(lambda: centre_of_pressure(state, SOLES, np.zeros(24)), InputError, 0)
     with raises(InputError, "held"):
-        held = SOLES + fb.Contacts(
-            [LinearConstraint("held", 1, lambda state, t: (np.eye(1, TALOS.nv), np.zeros(1)))]
-        )
+        rows = np.eye(1, TALOS.nv), np.zeros(1)
+        held = SOLES + fb.Contacts([LinearConstraint("held", 1, lambda state, t: rows)])
         centre_of_pressure(state, held, np.zeros(25))

@@ -1,18 +1,14 @@
 """Wrenches of a stance against cvxpy, linear programs over rows and rays, and brute force."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import count
 
 import cvxpy as cp
 import judges
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from judges import Array
 from messages import raises, refused
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
@@ -29,42 +25,32 @@ STANCES = [("go2", 4), ("go2", 3), ("go2", 2), ("go2", 1), ("talos", 2), ("talos
 
 
 @cache
-def stance(name: str, feet: int, tilt: float = 0.0) -> tuple[fb.State, fb.Contacts]:
+def stance(name, feet, tilt=0.0):
     """Return a robot standing on its first feet, each on its own slope if tilt > 0."""
     robot = judges.load(name)
     kind = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
     frames = [foot.frame for foot in robot.feet][:feet]
-    return robot.standing(), kind(
-        robot, 0.6, frames, judges.random_normals(feet, 7, tilt) if tilt else None
-    )
+    normals = judges.random_normals(feet, 7, tilt) if tilt else None
+    return robot.standing(), kind(robot, 0.6, frames, normals)
 
 
-def of(
-    points: npt.ArrayLike,
-    normals: npt.ArrayLike,
-    mu: float = 0.7,
-    n: int = 4,
-    inside: bool = True,
-    limit: npt.ArrayLike = np.inf,
-) -> WrenchSet:
+def of(points, normals, mu=0.7, n=4, inside=True, limit=np.inf):
     """Return the set of contact points without a robot, with weight 100 N, about the origin."""
     cones = tuple(
         FrictionPolyhedron(normal, mu, n, inside) for normal in np.asarray(normals, dtype=float)
     )
-    return WrenchSet(
-        np.asarray(points), cones, np.zeros(3), 100.0, np.broadcast_to(limit, len(cones))
-    )
+    limits = np.broadcast_to(limit, len(cones))
+    return WrenchSet(np.asarray(points), cones, np.zeros(3), 100.0, limits)
 
 
-def feet_on_slopes(seed: int, n: int = 4, facets: int = 4, inside: bool = True) -> WrenchSet:
+def feet_on_slopes(seed, n=4, facets=4, inside=True):
     """Return feet about a metre apart, some higher than others, each on its own slope."""
     rng = np.random.default_rng(seed)
-    return of(
-        rng.uniform(-0.5, 0.5, (n, 3)), judges.random_normals(n, seed, 0.8), 0.6, facets, inside
-    )
+    points = rng.uniform(-0.5, 0.5, (n, 3))
+    return of(points, judges.random_normals(n, seed, 0.8), 0.6, facets, inside)
 
 
-def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
+def random_wrenches(wrenches, n, seed):
     """Return sums of forces in the cones, so inside the set; perturb all but the first quarter.
 
     The perturbations grow with the index.
@@ -78,12 +64,9 @@ def random_wrenches(wrenches: WrenchSet, n: int, seed: int) -> Array:
 class Judge:
     """(20)(21)(28) in cvxpy: how far inside its cone every force can be, for four facets."""
 
-    def __init__(self, points: Array, normals: Array, mu: float, exact: bool):
-        forces, self.about, self.wrench = (
-            cp.Variable((len(points), 3)),
-            cp.Parameter(3),
-            cp.Parameter(6),
-        )
+    def __init__(self, points, normals, mu, exact):
+        forces = cp.Variable((len(points), 3))
+        self.about, self.wrench = cp.Parameter(3), cp.Parameter(6)
         self.t = cp.Variable()
         moment = [
             cp.sum([self._cross(x - self.about, forces[i])[j] for i, x in enumerate(points)])
@@ -100,17 +83,14 @@ class Judge:
         self.problem = cp.Problem(cp.Maximize(self.t), rows)
 
     @staticmethod
-    def _cross(a: cp.Expression, b: cp.Expression) -> list[cp.Expression]:
+    def _cross(a, b):
         return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
-    def margin(self, about: Array, wrench: Array) -> float:
+    def margin(self, about, wrench):
         self.about.value, self.wrench.value = about, wrench
         self.problem.solve(solver=cp.CLARABEL)
-        return (
-            -np.inf
-            if self.problem.status in ("infeasible", "infeasible_inaccurate")
-            else float(self.t.value)
-        )
+        infeasible = self.problem.status in ("infeasible", "infeasible_inaccurate")
+        return -np.inf if infeasible else float(self.t.value)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.5])
@@ -185,9 +165,8 @@ def test_one_foot_lacks_three_dimensions_and_two_lack_the_twist_about_their_line
         # (a - b) · (τ + (x_c - a) × f): the moment about the line through a and b
         about_line = np.concatenate([np.cross(a - b, wrenches.reference_point - a), a - b])
         row = wrenches.equalities[0]
-        assert (
-            np.linalg.matrix_rank(np.vstack([row / np.linalg.norm(row), about_line]), tol=1e-9) == 1
-        )
+        both = np.vstack([row / np.linalg.norm(row), about_line])
+        assert np.linalg.matrix_rank(both, tol=1e-9) == 1
         assert wrenches.margin(np.concatenate([np.zeros(3), a - b])) == -np.inf
 
 
@@ -212,12 +191,9 @@ def test_limits_make_the_set_bounded():
     state, contacts = stance("go2", 4, 0.4)
     limited = wrench_set(state, contacts, max_normal_force=[50.0, 60.0, 70.0, 80.0])
     for direction in np.random.default_rng(0).normal(size=(20, 6)):
-        best = linprog(
-            -(direction @ limited.rays),
-            np.kron(np.eye(4), np.ones(4)),
-            limited.max_normal_force,
-            bounds=(0, None),
-        )
+        sums = np.kron(np.eye(4), np.ones(4))
+        c, limits = -(direction @ limited.rays), limited.max_normal_force
+        best = linprog(c, sums, limits, bounds=(0, None))
         assert limited.contains(limited.rays @ best.x, tolerance=1e-5)
         assert not limited.contains(limited.rays @ best.x + 0.1 * direction) or best.fun == 0
 
@@ -236,21 +212,14 @@ def test_the_maximum_scaling_is_where_membership_ends():
 
 def test_the_largest_push_from_the_side_on_level_ground_is_mu_times_the_weight():
     """If the CoM is at ground level, only friction limits the push."""
-    wrenches = of(
-        [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]],
-        [UP] * 4,
-        0.5,
-        4,
-        inside=False,
-    )
+    points = [[0.3, 0.2, 0.0], [0.3, -0.2, 0.0], [-0.3, 0.2, 0.0], [-0.3, -0.2, 0.0]]
+    wrenches = of(points, [UP] * 4, 0.5, 4, inside=False)
     carrying = [0.0, 0.0, 100.0, 0.0, 0.0, 0.0]
     assert wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(50.0)
     assert wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], carrying) == np.inf
     assert wrenches.max_scaling([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], carrying) == pytest.approx(100.0)
-    assert (
-        wrenches.max_scaling([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0])
-        == np.inf
-    )
+    upwards, tilting = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 3.0, 0.0]
+    assert wrenches.max_scaling(upwards, tilting) == np.inf
     with raises(InfeasibleError, "start", "direction"):
         wrenches.max_scaling([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 
@@ -280,12 +249,12 @@ def test_a_facet_or_a_lever_ends_the_horizontal_reach_of_go2():
 # where a robot can stand
 
 
-def counter_clockwise(polygon: Array) -> bool:
+def counter_clockwise(polygon):
     x, y = polygon.T
     return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) > 0
 
 
-def depth(polygon: Array, at: Array) -> float:
+def depth(polygon, at):
     """Return how far inside a counter-clockwise polygon a point is, m."""
     edges = np.roll(polygon, -1, axis=0) - polygon
     inwards = np.column_stack([-edges[:, 1], edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
@@ -324,9 +293,8 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
         feet for feet in map(feet_on_slopes, count(100 * seed)) if len(feet.support_region()) > 2
     )
     region = wrenches.support_region()
-    judge = Judge(
-        wrenches.points, np.array([cone.normal for cone in wrenches.cones]), 0.6, exact=False
-    )
+    normals = np.array([cone.normal for cone in wrenches.cones])
+    judge = Judge(wrenches.points, normals, 0.6, exact=False)
     low, high = region.min(axis=0), region.max(axis=0)
     margin = 0.2 * (high - low)
     seen = set()
@@ -334,10 +302,8 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
         for y in np.linspace(low[1] - margin[1], high[1] + margin[1], 9):
             inside = depth(region, np.array([x, y]))
             if abs(inside) > 1e-3:
-                held = (
-                    judge.margin(np.array([x, y, 0.8]), np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]))
-                    > 0
-                )
+                weight = np.array([0.0, 0.0, 100.0, 0.0, 0.0, 0.0])
+                held = judge.margin(np.array([x, y, 0.8]), weight) > 0
                 assert held == (inside > 0)
                 seen.add(held)
     assert seen == {True, False}
@@ -381,11 +347,8 @@ def test_limits_on_the_normal_force_cut_the_corners_off():
 
 
 def test_walls_that_face_each_other_can_be_squeezed_without_end():
-    chimney = of(
-        [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]],
-        [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
-        0.5,
-    )
+    points = [[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0], [0.5, 1.0, 0.0]]
+    chimney = of(points, [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]], 0.5)
     assert chimney.margin([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]) == np.inf
     refused(chimney.support_region, InputError, "max_normal_force")
     limited = of(chimney.points, [cone.normal for cone in chimney.cones], 0.5, limit=400.0)
@@ -408,13 +371,8 @@ def test_a_grip_from_all_sides_makes_every_wrench():
 def test_moving_everything_changes_nothing(seed):
     here = feet_on_slopes(seed)
     step = np.random.default_rng(seed).normal(size=3)
-    there = WrenchSet(
-        here.points + step,
-        here.cones,
-        here.reference_point + step,
-        here.weight,
-        here.max_normal_force,
-    )
+    points, reference = here.points + step, here.reference_point + step
+    there = WrenchSet(points, here.cones, reference, here.weight, here.max_normal_force)
     assert np.allclose(there.rays, here.rays)
     region, moved = here.support_region(), there.support_region()
     assert region.shape == moved.shape

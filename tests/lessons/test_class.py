@@ -1,7 +1,5 @@
 """A class: packages without solutions, own numbers, late days, and gradebooks."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import json
@@ -11,7 +9,6 @@ import subprocess
 import sys
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -35,13 +32,13 @@ pytestmark = pytest.mark.usefixtures("learner")
 
 
 @pytest.fixture(scope="module")
-def assigned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def assigned(tmp_path_factory):
     folder = tmp_path_factory.mktemp("class") / "package"
     package.write_assignment(folder, ["1", "05"], teacher="Prof. Curie", until="31 May, 18:00")
     return folder
 
 
-def texts_of(path: Path) -> str:
+def texts_of(path):
     """All text of a file, with the strings of a program or a notebook as they are when it runs."""
     text = path.read_bytes().decode("utf-8", "ignore")
     if path.suffix == ".py":
@@ -54,7 +51,7 @@ def texts_of(path: Path) -> str:
     return text
 
 
-def squeezed(line: str) -> str:
+def squeezed(line):
     return re.sub(r"\s+", "", line)
 
 
@@ -169,7 +166,7 @@ def test_grading_uses_the_numbers_of_the_id(learner):
 # hand-ins of a class ------------------------------------------------------------------------------
 
 
-def right_answer(name: str, student: str) -> Any:
+def right_answer(name, student):
     exercise = EXERCISES[name]
     judge = exercise.judge_for(student)
     examples = [*getattr(judge, "examples", tuple)(), *exercise.examples()]
@@ -179,11 +176,11 @@ def right_answer(name: str, student: str) -> Any:
 KINDS = ("right", "partial", "late", "forged", "malformed", "few")
 
 
-def class_of_24(folder: Path) -> dict[str, tuple[str, float | None]]:
+def class_of_24(folder):
     """Write 24 files; return for each id what it is and the points that it deserves."""
     names = [n for n in EXERCISES if n.split(".")[0] in LESSONS and n != "06.3"]
     answers = {name: progress.as_json(right_answer(name, "")) for name in names if name not in OWN}
-    expected: dict[str, tuple[str, float | None]] = {}
+    expected = {}
     for i in range(24):
         student, kind = f"s{i:02}", KINDS[i % 6]
         given = dict(answers)
@@ -207,7 +204,7 @@ def class_of_24(folder: Path) -> dict[str, tuple[str, float | None]]:
             EXERCISES[n].own.value(n, student) == EXERCISES[n].own.value(n, f"s{i - 3:02}")
             for n in ("00.1", "06.2")
         )
-        points: dict[str, float | None] = {
+        points = {
             "right": len(names), "partial": 1, "few": len(names) - 1, "malformed": None,
             "late": len(names) if i % 12 == 2 else None, "forged": len(names) - 2 + copied,
         }  # fmt: skip
@@ -293,7 +290,7 @@ def test_a_gradebook_reads_other_forms_of_rosters(learner, kind, roster):
         assert len(rows) == (2 if kind == "canvas" else 1)
 
 
-def results(learner: Path, files: list[Path], **options: Any) -> dict[str, Any]:
+def results(learner, files, **options):
     metadata = learner / "submission_metadata.json"
     target = learner / "results.json"
     gradebook.write_gradescope_results(files, target, metadata=metadata, **options)

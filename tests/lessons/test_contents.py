@@ -2,8 +2,6 @@
 are up to date.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import pytest
@@ -15,7 +13,7 @@ from floatbase.qp import FEASIBILITY_TOLERANCE
 
 
 @pytest.fixture(scope="module")
-def entries() -> list[equations.Entry]:
+def entries():
     return equations.entries()
 
 

@@ -1,14 +1,11 @@
 """Exercises: what counts as a try, when a solution is shown, and where progress is kept."""
 
-from __future__ import annotations
-
 import json
 import multiprocessing
 import re
 import threading
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +21,7 @@ TIMES = 300  # tries of each of those who record at once
 pytestmark = pytest.mark.usefixtures("learner")
 
 
-def changed(answer: Any) -> Any:
+def changed(answer):
     """Another answer of the same kind."""
     if isinstance(answer, fb.Quadratic):
         return fb.Quadratic(answer.H, answer.g + 1e-3, answer.c)
@@ -85,9 +82,7 @@ def test_progress_is_kept_and_shown(capsys):
 
 
 @pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])
-def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
-    tmp_path, monkeypatch, home, capsys
-):
+def test_a_place_that_cannot_be_written_costs_only_the_memory(tmp_path, monkeypatch, home, capsys):
     show_progress()
     assert "cannot be saved" not in capsys.readouterr().out
     (tmp_path / "file").write_text("")
@@ -102,7 +97,7 @@ def test_a_place_that_cannot_be_written_to_costs_only_the_memory(
 
 
 def test_without_any_home_a_check_still_works(monkeypatch):
-    def none() -> Path:
+    def none():
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setenv("FLOATBASE_HOME", "")
@@ -142,7 +137,7 @@ def test_a_full_disk_costs_one_try(tmp_path):
     assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
 
 
-def record_often(name: str) -> None:
+def record_often(name):
     for _ in range(TIMES):
         progress.record_try(name, True)
 

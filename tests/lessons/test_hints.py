@@ -2,13 +2,10 @@
 mistake is named by.
 """
 
-from __future__ import annotations
-
 import ast
 import warnings
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,15 +29,15 @@ GUARDS = {
 
 
 @cache
-def examples(name: str) -> list[tuple[Any, str]]:
+def examples(name):
     exercise = EXERCISES[name]
     return [*getattr(exercise.judge, "examples", tuple)(), *exercise.examples()]
 
 
-def names_in(lesson: str) -> set[str]:
+def names_in(lesson):
     """Names of hints that are written in the modules of a lesson."""
     folder = Path(floatbase.__file__).parent / "lessons" / f"lesson{lesson}"
-    names: list[ast.expr] = []
+    names = []
     for path in folder.glob("*.py"):
         for call in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(call, ast.Call):

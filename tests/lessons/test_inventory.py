@@ -1,7 +1,5 @@
 """The concept inventory: well formed, from known mistakes, and a gain per concept."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +52,7 @@ def test_distractors_are_mistakes_that_the_course_knows():
             assert hint in all_questions()[name].choices, mistake
 
 
-def right_answer(words: str) -> str:
+def right_answer(words):
     """The right answer to the only question with these words."""
     (found,) = [question for question in QUESTIONS if words in question.text]
     return found.answers[found.right]

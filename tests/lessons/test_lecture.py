@@ -1,7 +1,5 @@
 """Questions for the lecture: four per lesson, with results and reasons from the lessons."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -39,7 +37,7 @@ def test_reasons_come_from_the_lesson_or_from_the_metadata_of_the_question():
     assert {one.name for one in known if one.reason} <= set(reasons)
 
 
-def text_of(lesson: str) -> str:
+def text_of(lesson):
     cells = read_notebook(lesson_notebooks()[lesson]).cells
     return "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
 

@@ -1,7 +1,5 @@
 """Lesson 01: its experiments are what they say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +8,13 @@ from hints import right
 
 import floatbase as fb
 from floatbase.lessons import joint_servo, lesson01
-from floatbase.robots import PLATE_SIZE, Foot, Robot, with_floating_base
+from floatbase.robots import PLATE_SIZE, Foot, with_floating_base
 
 WIDE_ENOUGH = 0.6596  # m: by hand, 2 (120 N · 0.6340 m / 205.95 N - 0.0396 m)
 
 
 @pytest.fixture(scope="module")
-def arm() -> Robot:
+def arm():
     return fb.load("ur5", posture=lesson01.PRESSING_POSTURE)
 
 
@@ -27,12 +25,12 @@ def test_a_servo_turns_back_joints_without_limits():
 
 
 @pytest.fixture(scope="module")
-def pressing(arm: Robot) -> Robot:
+def pressing(arm):
     """The arm on its plate."""
     return with_floating_base(arm, plate=True)
 
 
-def outcome(pressing: Robot, width: float, press: float) -> str:
+def outcome(pressing, width, press):
     """How two seconds of pressing end on a plate of that width, m, on the physics engine."""
     corners = [
         [x * width / 2, y * width / 2, -PLATE_SIZE[1]]

@@ -1,7 +1,5 @@
 """Lesson 02: its experiments are what they say."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -9,11 +7,10 @@ from hints import right
 
 import floatbase as fb
 from floatbase.lessons import lesson02
-from floatbase.robots import Robot
 
 
 @pytest.fixture(scope="module")
-def go2() -> Robot:
+def go2():
     return fb.load("go2")
 
 

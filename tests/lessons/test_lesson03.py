@@ -1,7 +1,5 @@
 """Lesson 03: its helpers do what they say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,9 +1,5 @@
 """Lesson 04: its helpers do what they say."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -19,13 +15,13 @@ GO2 = fb.load("go2")
 EFFORT = fb.Quadratic.from_residual(np.eye(12), np.zeros(12))
 
 
-def com_cost(eom: Any, desired: Any = DESIRED_ACCELERATION) -> fb.Quadratic:
+def com_cost(eom, desired=DESIRED_ACCELERATION):
     return fb.Quadratic.from_residual(
         eom.state.com_jacobian, np.asarray(desired) - eom.state.com_drift
     )
 
 
-def turn_cost(eom: Any) -> fb.Quadratic:
+def turn_cost(eom):
     return fb.Quadratic.from_residual(
         eom.state.frame_jacobian("base")[3:], -eom.state.frame_drift("base")[3:]
     )
@@ -35,7 +31,7 @@ def turn_cost(eom: Any) -> fb.Quadratic:
 def test_the_engine_measures_the_desired_acceleration(desired):
     contacts = fb.Contacts.points(GO2)
 
-    def cost(eom: Any) -> fb.Quadratic:
+    def cost(eom):
         return (com_cost(eom, desired) + turn_cost(eom)).pullback(
             fb.accelerations_from_torques(eom)
         ) + 1e-4 * EFFORT

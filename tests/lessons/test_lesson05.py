@@ -1,9 +1,5 @@
 """Lesson 05: its helpers do what they say."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 from hints import right
@@ -38,7 +34,7 @@ def test_no_weights_solve_exercise_05_3():
             for weight in 10.0 ** np.arange(-4.0, 2.0, 0.5):
                 preference = weight * (tangential + alpha * normal)
 
-                def design(force: Any, preference: fb.Quadratic = preference) -> fb.Quadratic:
+                def design(force, preference=preference):
                     goal = wrench_objective(EOM.state, EOM.contacts, force, no_moment)
                     return goal + preference
 

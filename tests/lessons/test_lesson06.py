@@ -1,7 +1,5 @@
 """Lesson 06: its helpers do what they say."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest

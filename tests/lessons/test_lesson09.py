@@ -1,7 +1,5 @@
 """Lesson 09: its helpers do what they say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -9,7 +7,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk
-from floatbase.friction import WrenchSet, centre_of_pressure, contact_wrench, wrench_set
+from floatbase.friction import centre_of_pressure, contact_wrench, wrench_set
 from floatbase.lessons import all_exercises
 from floatbase.lessons.lesson09 import (
     centre_of_pressure_path,
@@ -20,7 +18,6 @@ from floatbase.lessons.lesson09 import (
     run_standing,
     single_support_rows,
 )
-from floatbase.simulation import Rollout
 
 TALOS = load_talos()
 STATE = TALOS.standing()
@@ -31,12 +28,12 @@ SOLVED = 0.05  # N, and N·m: what a least-squares fit with a small cost on forc
 
 
 @cache
-def limits() -> WrenchSet:
+def limits():
     return replace(wrench_set(STATE, LEFT), reference_point=MIDDLE)
 
 
 @cache
-def stood() -> Rollout:
+def stood():
     return run_standing(SOLES, 0.4)
 
 

@@ -1,7 +1,5 @@
 """Lesson A: its helpers do what they say."""
 
-from __future__ import annotations
-
 import re
 
 import judges

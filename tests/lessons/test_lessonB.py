@@ -1,7 +1,5 @@
 """Lesson B: the bench is the package's cylinder, and pictures show it."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import judges
@@ -16,7 +14,7 @@ KNEE = ROBOT.joint_names.index("FL_calf_joint")
 ROUNDING = 1e-9  # N·m and Pa per Pa: the same formulas in another order
 
 
-def knee(hydraulics: Hydraulics) -> HydraulicActuators:
+def knee(hydraulics):
     """The package's actuators with another supply, the cylinders' size that of the first."""
     actuators = HydraulicActuators(ROBOT, hydraulics)
     size = ROBOT.torque_limits / Hydraulics().weakest_torque

@@ -1,9 +1,6 @@
 """Lesson C: the game is fair, and solvers in the loop do what the lesson says of them."""
 
-from __future__ import annotations
-
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +29,7 @@ from floatbase.qp import active_set, solve
 def test_stubs_with_functions_are_not_tries(monkeypatch, tmp_path):
     monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path))
     for name in ("C.2", "C.3", "C.4"):
-        made: dict[str, Any] = {}
+        made = {}
         exec("# of a cell\n\n" + all_exercises()[name].stub, {"np": np}, made)
         assert not check(name, next(iter(made.values()))).right
     assert progress.load() == {}
@@ -104,9 +101,9 @@ def test_only_a_warm_solver_converges_over_several_steps():
             assert np.allclose(solver.runs[-1].solution.x, solve(qp).x, atol=1e-7)
 
 
-def walked(qp: fb.QP, x: Any, most: int) -> tuple[Any, int]:
+def walked(qp, x, most):
     """The lesson's loop around the two solutions: where it ends, and after how many rounds."""
-    W: list[int] = []
+    W = []
     for rounds in range(1, most + 1):
         G = qp.G[W]
         KKT = np.block([[qp.H, G.T], [G, np.zeros((len(W), len(W)))]])
@@ -131,7 +128,7 @@ def test_the_solver_of_the_lesson_ends_at_every_step_of_a_large_push():
     controller = standing_controller()
     quarter = np.tile([0.0, 0.0, controller.robot.weight / 4], 4)
 
-    def solver(qp: fb.QP) -> Any:
+    def solver(qp):
         space = qp.equality_space
         start = np.linalg.solve(space.A[30:], quarter - space.b[30:])
         beta, rounds = walked(qp.reduced, start, most=60)

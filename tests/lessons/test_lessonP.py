@@ -1,7 +1,5 @@
 """Lesson P: its runs are what they say, and can be plotted."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -18,14 +16,11 @@ def test_an_unknown_mass_lowers_the_centre_of_mass_like_a_spring(kp):
     assert com_sag(kp, 0.0) == pytest.approx(0.0, abs=1e-5)
 
 
-def _shift() -> np.ndarray:
+def _shift():
     """By the formula for the foot of a plumb line on a line through two points."""
     state = GO2.standing()
-    (x1, y1, _), (x2, y2, _), (x0, y0, _) = (
-        state.point("FL_foot"),
-        state.point("RR_foot"),
-        state.com,
-    )
+    feet = state.point("FL_foot"), state.point("RR_foot")
+    (x1, y1, _), (x2, y2, _), (x0, y0, _) = *feet, state.com
     a, b, c = y1 - y2, x2 - x1, x1 * y2 - x2 * y1
     return -(a * x0 + b * y0 + c) / (a**2 + b**2) * np.array([a, b, 0.0])
 

@@ -2,13 +2,9 @@
 finds the fault.
 """
 
-from __future__ import annotations
-
 import pickle
-from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
-from typing import Any
 
 import judges
 import numpy as np
@@ -19,7 +15,6 @@ from floatbase.lessons import all_exercises
 from floatbase.lessons.lessonX import (
     FAULTS,
     BlackBox,
-    Case,
     InjectedFault,
     black_boxes,
     crash_test,
@@ -40,22 +35,22 @@ SEEDS = (1,)
 
 
 @cache
-def program() -> Callable[[BlackBox], str]:
+def program():
     """The solution of X.3, which sees nothing but a box."""
-    made: dict[str, Any] = {}
+    made = {}
     exec(all_exercises()["X.3"].solution, made)
-    found: Callable[[BlackBox], str] = made["investigate"]
+    found = made["investigate"]
     return found
 
 
 @cache
-def cases(seed: int) -> tuple[tuple[Case, BlackBox], ...]:
+def cases(seed):
     drawn = random_cases(seed) + faultless_cases(seed)
     return tuple(zip(drawn, black_boxes(seed) + faultless_boxes(seed), strict=True))
 
 
 @cache
-def missing_forces(seed: int) -> tuple[np.ndarray, ...]:
+def missing_forces(seed):
     """What (7) needs besides the measured forces, for each case."""
     return tuple(required_forces(box) for _, box in cases(seed))
 

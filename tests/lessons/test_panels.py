@@ -1,22 +1,17 @@
 """Panels: sliders show the numbers that are computed with, and pushes follow the handle."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import time
-from collections.abc import Iterator
 
-import ipywidgets as widgets
 import numpy as np
 import pytest
 import tornado.websocket
 from waiting import until
 
 import floatbase as fb
-from floatbase.lessons import SliderPanel, live_run, push_panel, slider_panel
+from floatbase.lessons import live_run, push_panel, slider_panel
 from floatbase.lessons.slider_samples import panel_samples
-from floatbase.simulation import LiveSimulation
 
 RANGES = [
     (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05),
@@ -28,17 +23,15 @@ RANGES = [
 
 
 @pytest.fixture(scope="module")
-def view() -> Iterator[fb.Viewer]:
+def view():
     made = fb.Viewer(fb.load("ur5"))
     yield made
     made.close()
 
 
-def slider_of(
-    view: fb.Viewer, low: float, first: float, high: float
-) -> tuple[widgets.FloatSlider, list[float]]:
+def slider_of(view, low, first, high):
     """The slider of a panel that has one, and the values that its picture was drawn for."""
-    drawn: list[float] = []
+    drawn = []
     return slider_panel(view, lambda x: drawn.append(x), x=(low, first, high)).sliders["x"], drawn
 
 
@@ -69,7 +62,7 @@ def test_a_range_may_have_no_width(view):
 
 
 def test_a_slider_names_its_unit_and_the_note_shows_errors(view):
-    def draw(push_force: float) -> str:
+    def draw(push_force):
         if push_force:
             raise fb.FloatbaseError("too hard")
         return f"<b>{push_force:.0f}</b>"
@@ -85,7 +78,7 @@ def test_a_slider_names_its_unit_and_the_note_shows_errors(view):
 
 @pytest.mark.parametrize("beside", [False, True])
 def test_a_displayed_panel_holds_its_picture(view, beside):
-    panel: SliderPanel = slider_panel(view, lambda x: None, beside=beside, x=(0.0, 1.0, 2.0))
+    panel = slider_panel(view, lambda x: None, beside=beside, x=(0.0, 1.0, 2.0))
     picture = (panel.children[0].children if beside else panel.children)[0]
     assert picture.children == ()
     data, _ = panel._repr_mimebundle_()
@@ -111,27 +104,27 @@ def test_a_panel_without_a_view_shows_the_result_of_its_function():
 class Pushed:
     """What a reader can touch of a push panel, and the run behind it."""
 
-    def __init__(self, robot: fb.Robot):
+    def __init__(self, robot):
         contacts, tasks = fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
         controller = fb.WholeBodyController(robot, contacts, tasks)
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
-        self.run: LiveSimulation = live_run(self.sim, controller, self.view)
+        self.run = live_run(self.sim, controller, self.view)
         panel = push_panel(self.run, self.view, max_force=600.0)
         _, self.force, row, self.speed, buttons = panel.children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
-        self.buttons: dict[str, widgets.Button] = {b.description: b for b in buttons.children[:-1]}
+        self.buttons = {b.description: b for b in buttons.children[:-1]}
 
     @property
-    def arrow(self) -> np.ndarray | None:
+    def arrow(self):
         """Direction of the push in the picture, shape (3,), m."""
         item = self.view.renderer.picture.get("push")
         return None if item is None else np.array(item.matrix[:3, 2])
 
 
 @pytest.fixture
-def panel() -> Iterator[Pushed]:
+def panel():
     made = Pushed(fb.load("go2"))
     yield made
     made.run.close()

@@ -2,16 +2,12 @@
 kernel.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json
 import re
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -33,36 +29,36 @@ RANGES = [
     (0, 0, 5, 0.1),
 ]  # fmt: skip
 ANIMATION = "set_animation"
-GIVEN: dict[str, Any] = {
+GIVEN = {
     "samples": {"down": (0, 0.05, 0.1), "force": (0, 30, 60)},
     "down": (0, 0.05, 0.1, "m"), "force": (0, 30, 60, "N"),
 }  # fmt: skip
 
 
 @pytest.fixture(autouse=True)
-def for_a_site(monkeypatch: pytest.MonkeyPatch) -> None:
+def for_a_site(monkeypatch):
     monkeypatch.setenv("FLOATBASE_VIEWER", "site")
 
 
 @pytest.fixture(scope="module")
-def go2() -> fb.Robot:
+def go2():
     return fb.load("go2")
 
 
 @pytest.fixture
-def view(go2: fb.Robot) -> Iterator[fb.Viewer]:
+def view(go2):
     made = fb.Viewer(go2, height=200)
     yield made
     made.close()
 
 
-def squat(view: fb.Viewer, **ranges: Any) -> Any:
+def squat(view, **ranges):
     """A panel that moves the robot, and shows its forces from 20 N on: they come and go, and change
     their colour.
     """
     standing, contacts = view.robot.standing(), fb.Contacts.points(view.robot)
 
-    def draw(down: float, force: float = 0.0) -> str:
+    def draw(down, force=0.0):
         q = standing.q.copy()
         q[2] -= down
         forces = np.tile([0.6 * force - 15.0, 0.0, force], (4, 1)) if force >= 20.0 else None
@@ -74,13 +70,11 @@ def squat(view: fb.Viewer, **ranges: Any) -> Any:
     return slider_panel(view, draw, **ranges)
 
 
-def data_of(shown: Any) -> dict[str, Any]:
+def data_of(shown):
     return dict(shown._repr_mimebundle_()[static_export.MIME])
 
 
-def scene_at(
-    data: dict[str, Any], stop: str | None = None, view: int = 0
-) -> dict[tuple[str, ...], bytes]:
+def scene_at(data, stop=None, view=0):
     """Key -> command of the first scene, or of a stop's, assembled as pictures.js does it."""
     commands, scene = static_export.commands(data), {}
     changes = data["stops"][stop][1 + view] if stop is not None else []
@@ -185,7 +179,7 @@ def test_a_push_panel_becomes_recorded_runs(view):
 # files --------------------------------------------------------------------------------------------
 
 
-def parts_of(path: Path) -> list[bytes]:
+def parts_of(path):
     found = re.fullmatch(
         r'floatbasePictures\.take\("([^"]+)","([^"]+)"\)\n', path.read_text(encoding="ascii")
     )
@@ -193,7 +187,7 @@ def parts_of(path: Path) -> list[bytes]:
     return protocol.unframe(gzip.decompress(base64.b64decode(found.group(2))))
 
 
-def placed(html: str) -> str:
+def placed(html):
     return re.findall(r'data-picture="([^"]+)"', html)[0]
 
 
@@ -263,7 +257,7 @@ browser = browser_of_a_file
 
 
 @pytest.fixture(scope="module")
-def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(go2, tmp_path_factory):
     """A page of a panel, a recording far below it and a note with a slider, one level deep as the
     pages of the site.
     """
@@ -295,11 +289,11 @@ def site(go2: fb.Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def page(site: Path, browser: Any) -> Iterator[Any]:
+def page(site, browser):
     """The page, served by this machine; it asks nobody else and reports no error."""
     opened = browser.new_page(viewport={"width": 900, "height": 700}, reduced_motion="reduce")
-    said: list[str] = []
-    requested: list[str] = []
+    said = []
+    requested = []
     opened.on("console", lambda line: said.append(line.text) if line.type == "error" else None)
     opened.on("pageerror", lambda error: said.append(str(error)))
     opened.on("request", lambda request: requested.append(request.url))
@@ -312,7 +306,7 @@ def page(site: Path, browser: Any) -> Iterator[Any]:
         opened.close()
 
 
-def inside(page: Any, number: int = 0) -> Any:
+def inside(page, number=0):
     """The frame of a picture, once it has drawn."""
     place = page.locator(".floatbase-picture:has(.floatbase-scene)").nth(number)
     place.scroll_into_view_if_needed()
@@ -336,7 +330,7 @@ SIGNATURE = """() => {
 }"""
 
 
-def set_to(page: Any, number: int, value: int) -> None:
+def set_to(page, number, value):
     page.locator("input[type=range]").nth(number).evaluate(
         "(one, value) => { one.value = value; one.dispatchEvent(new Event('input')); }", value
     )
@@ -361,7 +355,7 @@ def test_a_slider_moves_the_robot_without_a_kernel(page):
 @needs_chromium
 def test_a_sample_looks_the_same_after_any_other(page):
     frame = inside(page)
-    seen: dict[int, Any] = {}
+    seen = {}
     count = 1
     for order in ([0, 1, 2, 1, 0], [2, 0, 1, 2]):
         for force in order:

@@ -2,12 +2,8 @@
 error.
 """
 
-from __future__ import annotations
-
 import json
 import re
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,12 +21,12 @@ pytestmark = pytest.mark.usefixtures("learner")
 
 
 @pytest.fixture
-def said(capsys: pytest.CaptureFixture[str]) -> Any:
+def said(capsys):
     """What was printed since it was last asked for."""
     return lambda: capsys.readouterr().out.splitlines()
 
 
-def lines(learner: Path) -> list[Any]:
+def lines(learner):
     """What stands in the learner's file, without times."""
     path = learner / "progress.jsonl"
     text = path.read_text() if path.exists() else ""
@@ -221,9 +217,7 @@ def test_what_was_said_to_another_question_of_that_name_does_no_harm(said, befor
     assert said()[0].startswith("02.c: 69 mm")
 
 
-def test_where_nothing_can_be_kept_it_lives_as_long_as_the_process_and_a_line_says_why(
-    learner, monkeypatch, said
-):
+def test_what_cannot_be_kept_lives_with_the_process_and_a_line_says_why(learner, monkeypatch, said):
     (learner / "file").write_text("")
     monkeypatch.setenv("FLOATBASE_HOME", str(learner / "file"))
     predict("05.u", 40, unit="mm")

@@ -1,7 +1,5 @@
 """Stored push-recovery maps of the lessons agree with the physics engine."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,9 +1,5 @@
 """Plots of quadratic programs in the plane agree with their constraints and costs."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -18,13 +14,13 @@ BOX = (-3.0, 3.0, -2.0, 3.0)
 NONE = np.zeros((0, 2)), np.zeros(0)
 
 
-def qp_of(H: Any, g: Any, G: Any, h: Any) -> QP:
+def qp_of(H, g, G, h):
     """A QP of two variables without equalities."""
     G = np.reshape(G, (-1, 2))
     return QP(np.asarray(H), np.asarray(g), *NONE, G, np.asarray(h))
 
 
-def random_qp(seed: int) -> QP:
+def random_qp(seed):
     rng = np.random.default_rng(seed)
     rows = int(rng.integers(1, 7))
     g, G, h = rng.normal(size=2), rng.normal(size=(rows, 2)), rng.uniform(-0.3, 2.0, rows)
@@ -56,7 +52,7 @@ def test_normals_times_multipliers_add_up_to_the_negative_gradient(seed):
         x = solve(qp).x
     except InfeasibleError:
         pytest.skip("no feasible point")
-    axis: Any = qp_plots.plot_optimum(qp, BOX)
+    axis = qp_plots.plot_optimum(qp, BOX)
     *normals, gradient = [text for text in axis.texts if text.arrow_patch is not None]
     ends = [np.array([arrow.xyann, arrow.xy]) for arrow in normals]
     tip = ends[-1][1] if ends else x
@@ -70,7 +66,7 @@ def test_a_level_curve_has_one_value_of_the_cost():
     H = np.array([[2.0, 0.5], [0.5, 1.0]])
     flat = qp_of(np.diag([1.0, 0.0]), [0.0, 0.0], [], [])
     for qp in (qp_of(H, [1.0, -0.5], [], []), table_top(), flat):
-        axis: Any = qp_plots.plot(qp, BOX)
+        axis = qp_plots.plot(qp, BOX)
         curves = [path for path in axis.collections[0].get_paths() if len(path.vertices)]
         spread = [np.ptp([qp.objective(point) for point in path.vertices]) for path in curves]
         assert len(curves) >= 5

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -18,9 +16,7 @@ SOURCE = 'predict("11.a", ..., unit="N", count=2)'
 ABOVE = "## Wheels\n\nA wheel rolls.\n\n**Predict 11.a**: how large are\nthe two forces?"
 
 
-def read(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, **metadata: Any
-) -> dict[str, questions.Question]:
+def read(folder, monkeypatch, **metadata):
     """The questions of a course with one lesson."""
     notebook = {
         "cells": [

@@ -1,14 +1,11 @@
 """Recall: what was missed comes back soon, what was known later, and nothing else is asked."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -30,11 +27,11 @@ WEEKS = {0: "00", 1: "01", 7: "02", 9: "03", 14: "04", 21: "05"}  # day -> lesso
 pytestmark = pytest.mark.usefixtures("learner")
 
 
-def write(learner: Path, entries: list[dict[str, Any]]) -> None:
+def write(learner, entries):
     (learner / "progress.jsonl").write_text("\n".join(json.dumps(entry) for entry in entries))
 
 
-def settled(name: str, day: float, right: bool, sure: bool | None = None) -> dict[str, Any]:
+def settled(name, day, right, sure=None):
     """A line about a prediction, as `predict` and `compare` write it."""
     time = (START + timedelta(days=day)).isoformat()
     entry = {"said": 1.0 if right else 2.0, "is": 1.0, "unit": "N", "time": time}
@@ -56,9 +53,9 @@ def test_four_weeks_of_a_learner(learner):
     """A learner who knows two of three answers works through a lesson now and then."""
     random = np.random.default_rng(1)
     known = all_questions()
-    entries: list[dict[str, Any]] = []
-    taught: set[str] = set()
-    asked: dict[str, list[tuple[int, bool]]] = {}
+    entries = []
+    taught = set()
+    asked = {}
     per_day = []
     for day in range(28):
         write(learner, entries)
@@ -162,9 +159,7 @@ def test_the_command_asks_what_is_due(learner, monkeypatch, capsys):
     ask(lambda prompt: (_ for _ in ()).throw(EOFError))
 
 
-def random_history(
-    random: np.random.Generator, names: list[str], questions: dict[str, Any]
-) -> list[dict[str, Any]]:
+def random_history(random, names, questions):
     """Lines about some of these questions, with predictions, results and answers to recall()."""
     entries = []
     for name in names:
@@ -186,7 +181,7 @@ def random_history(
     return entries
 
 
-def time_of(day: float) -> str:
+def time_of(day):
     return (START + timedelta(days=day)).isoformat(timespec="seconds")
 
 

@@ -1,7 +1,5 @@
 """Numbers as text: two significant digits, zero below a floor, independent of the last bits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -33,11 +31,8 @@ def test_a_number_has_two_digits_and_no_minus_zero(number, text):
 
 
 def test_unit_digits_and_floor_can_be_chosen():
-    assert (rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")) == (
-        "69 mm",
-        "30°",
-        "not a number",
-    )
+    found = rounded(69.2, "mm"), rounded(30.0, "°"), rounded(np.nan, "mm")
+    assert found == ("69 mm", "30°", "not a number")
     assert (rounded(157.76, "N", digits=4), rounded(157.76, "N", digits=1)) == ("157.8 N", "200 N")
     assert (rounded(3e-14, floor=0.0), rounded(0.04, "N", floor=0.05)) == ("3e-14", "0 N")
 

@@ -1,13 +1,9 @@
 """Answers on the site: judged in the browser, kept there, and read by review and grade."""
 
-from __future__ import annotations
-
 import html
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from browsers import browser_of_a_file, served
@@ -29,11 +25,11 @@ SCRIPTS = "".join(
 
 
 class NoPictures:
-    def place(self, data: Any) -> None:
+    def place(self, data):
         """No picture is shown."""
 
 
-def elements(lesson: str) -> list[str]:
+def elements(lesson):
     """The forms of a lesson, as HTML."""
     notebook = read_notebook(lesson_notebooks()[lesson])
     prepared = site.prepare_lesson(notebook, NoPictures(), {})
@@ -42,7 +38,7 @@ def elements(lesson: str) -> list[str]:
     return [cell.removeprefix("```{raw} html\n").removesuffix("\n```") for cell in cells]
 
 
-def data_of(element: str) -> Any:
+def data_of(element):
     return json.loads(html.unescape(re.findall('data-answers="([^"]*)"', element)[0]))
 
 
@@ -93,26 +89,26 @@ def test_exercises_of_a_few_numbers_have_a_form_and_the_judges_own_hints():
             assert fits[0]["text"] == judge(answer).text
 
 
-def write_page(folder: Path, forms: str) -> None:
+def write_page(folder, forms):
     (folder / "page.html").write_text(f"<!doctype html><meta charset=utf-8>{forms}{SCRIPTS}")
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any]:
+def page(tmp_path_factory, browser):
     """A page with the forms of lessons 00 and 03."""
     folder = tmp_path_factory.mktemp("answers")
     forms = "\n".join(elements("03") + [e for e in elements("00") if "-exercise" in e])
     write_page(folder, forms)
     with served(folder) as address:
         opened = browser.new_context(accept_downloads=True).new_page()
-        faults: list[str] = []
+        faults = []
         opened.on("pageerror", lambda error: faults.append(str(error)))
         opened.goto(f"{address}/page.html")
         yield opened
         assert faults == []
 
 
-def fill(form: Any, kind: str) -> str:
+def fill(form, kind):
     """Answer a question "right", "wrong" or with "nonsense", and return what the page says."""
     data = json.loads(form.locator("xpath=..").get_attribute("data-answers"))
     if data["choices"]:
@@ -183,7 +179,7 @@ def test_a_reader_answers_lesson_03_reloads_and_hands_in(page, tmp_path, monkeyp
 
 
 @pytest.fixture(scope="module")
-def recalling(tmp_path_factory: pytest.TempPathFactory, browser: Any) -> Iterator[Any]:
+def recalling(tmp_path_factory, browser):
     """A page that asks what is due."""
     folder = tmp_path_factory.mktemp("recall")
     site.recall.write_script([NOTEBOOKS / "02_equations_of_motion.ipynb"], folder)

@@ -1,14 +1,11 @@
 """Handing in: files keep the answers, grading judges them again, and no file runs code."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,11 +21,11 @@ from floatbase.lessons.publish.__main__ import main
 pytestmark = pytest.mark.usefixtures("learner")
 
 
-def through_a_file(answer: Any) -> Any:
+def through_a_file(answer):
     return progress.from_json(json.loads(json.dumps(progress.as_json(answer))))
 
 
-def same(a: Any, b: Any) -> bool:
+def same(a, b):
     if isinstance(a, fb.Quadratic):
         a, b = (a.H, a.g, a.c), (b.H, b.g, b.c)
     if isinstance(a, tuple):
@@ -45,7 +42,7 @@ def test_a_file_keeps_every_kind_of_answer_to_the_last_bit():
 
 
 def test_a_file_keeps_odd_answers_in_some_form():
-    endless: list[Any] = []
+    endless = []
     endless.append(endless)
     for odd in [*ODD.values(), endless, np.zeros((1000, 1000)), lambda x: x]:
         json.dumps(progress.as_json(odd))
@@ -84,7 +81,7 @@ def test_hand_in_asks_to_check_again_answers_that_were_not_kept(learner, capsys)
 def test_grading_shows_code_and_never_runs_it(learner):
     ran = []
 
-    def row_to_drop(W: Any, prices: Any) -> None:
+    def row_to_drop(W, prices):
         ran.append(W)
 
     check("C.3", row_to_drop)
@@ -191,7 +188,7 @@ def test_learners_with_similar_names_can_hand_in_at_once(learner, monkeypatch):
     submission = sys.modules[hand_in.__module__]
     write = submission.write_whole
 
-    def write_after_another(path: Path, text: bytes) -> None:
+    def write_after_another(path, text):
         monkeypatch.setattr(submission, "write_whole", write)
         hand_in("A B")  # between the choice of the first one's file and its writing
         write(path, text)

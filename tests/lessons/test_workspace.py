@@ -1,12 +1,7 @@
 """The learner's work is kept, whatever happens to the course; `make lab` is quick to prepare it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import nbformat
 import pytest
@@ -19,29 +14,29 @@ from floatbase.lessons.publish import MY_FOLDER, prepare_workspace
 LESSON, NEW, NEW2 = "00_a.ipynb", "00_a.new.ipynb", "00_a.new2.ipynb"
 
 
-def write(path: Path, source: str, output: str = "") -> None:
+def write(path, source, output=""):
     cell = new_code_cell(source, id="a")
     if output:
         cell.outputs = [new_output("stream", text=output)]
     nbformat.write(new_notebook(cells=[cell]), path)
 
 
-def source(path: Path) -> str:
+def source(path):
     return nbformat.read(path, as_version=4).cells[0].source
 
 
-def files(folder: Path) -> set[str]:
+def files(folder):
     return {path.name for path in folder.iterdir()} - {".from.json"}
 
 
 @pytest.fixture
-def course(tmp_path: Path) -> Path:
+def course(tmp_path):
     write(tmp_path / LESSON, "first = 1")
     return tmp_path
 
 
 @pytest.fixture
-def mine(course: Path) -> Path:
+def mine(course):
     """The learner's folder, prepared."""
     (course / "page.md").write_text("a page, 1")
     write(course / "01_b.ipynb", "first = 1")
@@ -49,7 +44,7 @@ def mine(course: Path) -> Path:
     return course / MY_FOLDER
 
 
-def update(course: Path, n: int = 2) -> None:
+def update(course, n=2):
     for lesson in course.glob("*.ipynb"):
         write(lesson, f"first = {n}")
     (course / "page.md").write_text(f"a page, {n}")
@@ -162,7 +157,7 @@ LOOKS = {
     "collapsed": True, "scrolled": True, "trusted": True,
 }  # fmt: skip
 KERNEL = {"kernelspec": {"name": "p", "display_name": "P"}, "widgets": {"a": 1}}
-CHANGES: dict[str, tuple[bool, Callable[[Any], object]]] = {
+CHANGES = {
     "an attached picture": (True, lambda book: book.cells[0].update(attachments=PICTURE)),
     "a tag": (True, lambda book: book.cells[0].metadata.update(tags=["mine"])),
     "a title": (True, lambda book: book.metadata.update(title="mine")),
@@ -204,21 +199,21 @@ def test_a_damaged_record_keeps_everything_written(mine, text):
     assert prepare_workspace(mine.parent) == [f"{LESSON}: new"]
 
 
-def linked(path: Path, to: Path) -> None:
+def linked(path, to):
     path.unlink(missing_ok=True)
     path.symlink_to(to)
 
 
-def folder(path: Path) -> None:
+def folder(path):
     path.unlink(missing_ok=True)
     path.mkdir()
 
 
-def written(text: str) -> Callable[[Path], object]:
+def written(text):
     return lambda mine: (mine.parent / LESSON).write_text(text)
 
 
-OBSTACLES: dict[str, Callable[[Path], object]] = {
+OBSTACLES = {
     "a merge conflict in the course": written("<<<<<<< HEAD\n{}"),
     "another form of JSON in the course": written('{"cells": [5], "metadata": null}'),
     "a broken link in the course": lambda mine: linked(mine.parent / LESSON, mine / "nowhere"),

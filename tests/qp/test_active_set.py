@@ -1,7 +1,5 @@
 """The active-set solver: right answers, a true record of the iterations, termination."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import judges
@@ -16,22 +14,19 @@ from scipy.optimize import linprog
 import floatbase as fb
 from floatbase.errors import InfeasibleError, SolverError
 from floatbase.lessons.lessonC import table_top
-from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ActiveSetRun, active_set, solve
+from floatbase.qp import FEASIBILITY_TOLERANCE, QP, active_set, solve
 
-Array = np.ndarray
 BOX = np.vstack([np.eye(2), -np.eye(2)])
 
 
-def problem(
-    H: object, g: object, G: object = (), h: object = (), A: object = (), b: object = ()
-) -> QP:
+def problem(H, g, G=(), h=(), A=(), b=()):
     """A QP of small arrays; rows that are not given are none."""
     n = len(np.asarray(g))
     rows = [np.asarray(M, dtype=np.float64).reshape(-1, n) for M in (A, G)]
     return QP(np.asarray(H), np.asarray(g), rows[0], np.asarray(b), rows[1], np.asarray(h))
 
 
-def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
+def check_optimum(run, tolerance=1e-7):
     """Karush, Kuhn and Tucker: sufficient for a convex problem, whoever solved it."""
     qp, r = run.solution.qp, run.solution.residuals
     scale = 1.0 + float(np.max(np.abs(qp.H) @ np.abs(run.solution.x) + np.abs(qp.g)))
@@ -40,7 +35,7 @@ def check_optimum(run: ActiveSetRun, tolerance: float = 1e-7) -> None:
     assert r.complementarity < tolerance * scale and r.dual == 0.0
 
 
-def check_record(run: ActiveSetRun) -> None:
+def check_record(run):
     """Each iteration starts where the last arrived, satisfies all rows, raises no objective and
     says what it did.
     """
@@ -101,9 +96,8 @@ def test_the_way_to_a_minimum_below_the_table_is_down_to_it_and_along_it():
 
 
 def test_a_row_that_would_have_to_pull_is_dropped():
-    first, second = active_set(
-        table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"]
-    ).iterations
+    run = active_set(table_top((0.5, 1.0)), start=(0.0, 0.0), working_set=["table"])
+    first, second = run.iterations
     assert first.multipliers == {"table": pytest.approx(-1.0)} and first.dropped == "table"
     assert second.working_set == ()
     assert np.allclose(second.x_next, [0.5, 1.0])
@@ -160,7 +154,7 @@ def test_a_stopped_run_can_be_taken_up_again_where_it_ended():
 # the controller's problems ------------------------------------------------------------------------
 
 
-def controller_qps(name: str, n: int, torque: float, mu: float = 0.5) -> list[QP]:
+def controller_qps(name, n, torque, mu=0.5):
     """n problems of random states near standing, half of them calm, half far off; motors with part
     of their torque.
     """
@@ -197,7 +191,7 @@ def test_the_solver_agrees_with_daqp_on_20_problems_of_a_robot_and_records_its_i
     assert "facet" in active or not judges.load(name).feet
 
 
-def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
+def swaying_qps(name, ticks, dt=0.002):
     """The problems of consecutive ticks while the centre of mass has a target that sways more than
     a slippery floor allows.
     """
@@ -207,10 +201,9 @@ def swaying_qps(name: str, ticks: int, dt: float = 0.002) -> list[QP]:
     tasks = [com, *fb.standing_tasks(state)[1:]]
     contacts = judges.stance(robot, mu=0.25)
     limits = 0.6 * robot.torque_limits
-    controller = fb.WholeBodyController(
-        robot, contacts, tasks, torque_limits=limits, backend="reference"
-    )
-    qps: list[QP] = []
+    options = {"torque_limits": limits, "backend": "reference"}
+    controller = fb.WholeBodyController(robot, contacts, tasks, **options)
+    qps = []
     for tick in range(ticks):
         qps.append(controller.qp(state, 0.2 + tick * dt))
         v = state.v + dt * solve(qps[-1])["qdd"]
@@ -238,9 +231,8 @@ def test_a_warm_start_from_the_last_tick_needs_fewer_iterations(name, ticks):
 def test_a_demand_that_no_force_meets_is_infeasible_with_a_smallest_set_of_rows(name):
     robot = judges.load(name)
     tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
-    controller = fb.WholeBodyController(
-        robot, contacts, tasks, min_normal_force=2000.0, solver="active_set"
-    )
+    options = {"min_normal_force": 2000.0, "solver": "active_set"}
+    controller = fb.WholeBodyController(robot, contacts, tasks, **options)
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, robot.standing().v)
     assert judges.is_smallest_conflict(controller.qp(robot.standing()), caught.value.constraints)
@@ -292,12 +284,8 @@ def test_beales_cycling_example_terminates():
     """Beale (1955): by the steepest multiplier and no rule for ties the simplex method comes back
     to its start.
     """
-    rows = [
-        [0.25, -60.0, -1 / 25, 9.0],
-        [0.5, -90.0, -1 / 50, 3.0],
-        [0.0, 0.0, 1.0, 0.0],
-        *-np.eye(4),
-    ]
+    rows = [[0.25, -60.0, -1 / 25, 9.0], [0.5, -90.0, -1 / 50, 3.0], [0.0, 0.0, 1.0, 0.0]]
+    rows += [*-np.eye(4)]
     qp = problem(np.zeros((4, 4)), [-0.75, 150.0, -1 / 50, 6.0], rows, [0, 0, 1, 0, 0, 0, 0])
     run = active_set(qp, np.zeros(4), [f"inequality {i}" for i in range(3, 7)])
     assert run.solution.objective == pytest.approx(-1 / 20)
@@ -336,7 +324,7 @@ def test_curvature_only_counts_where_the_equalities_hold():
 # random problems ----------------------------------------------------------------------------------
 
 
-def random_qp(seed: int) -> QP:
+def random_qp(seed):
     """Whole numbers, so that rows repeat, depend and meet; H of any rank; feasible or not, bounded
     or not.
     """
@@ -344,7 +332,7 @@ def random_qp(seed: int) -> QP:
     n = int(rng.integers(1, 7))
     rows, equalities = int(rng.integers(0, 4 * n + 1)), int(rng.integers(0, min(3, n) + 1))
 
-    def whole(*shape: int) -> Array:
+    def whole(*shape):
         return rng.integers(-2, 3, shape).astype(np.float64)
 
     root = whole(int(rng.integers(0, n + 1)), n)
@@ -355,7 +343,7 @@ def random_qp(seed: int) -> QP:
     return QP(root.T @ root, whole(n), A, A @ inside, G, h)
 
 
-def verdict(qp: QP) -> str:
+def verdict(qp):
     """By linear programs: is there a point, and a direction without curvature or row where the
     objective falls?
     """

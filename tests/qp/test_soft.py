@@ -1,7 +1,5 @@
 """Soft inequalities: exact penalties against cvxpy, least violations against linear programs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cvxpy as cp
@@ -14,7 +12,7 @@ from floatbase.errors import InfeasibleError, InputError
 from floatbase.qp import QP, active_set, solve, solvers
 
 
-def random_problem(rng: np.random.Generator, n: int = 8, rows: int = 12, soft: int = 6) -> QP:
+def random_problem(rng, n=8, rows=12, soft=6):
     """Return a problem whose hard rows hold at 0 and whose soft rows exclude each other."""
     L = rng.normal(size=(n, n))
     G, h = rng.normal(size=(rows, n)), rng.uniform(0.1, 1.0, rows)
@@ -37,9 +35,8 @@ def test_the_minimizer_is_that_of_the_objective_with_penalties(solver):
         x = cp.Variable(qp.n)
         penalty = qp.penalties[soft] @ cp.pos(qp.G[soft] @ x - qp.h[soft])
         cost = 0.5 * cp.quad_form(x, cp.psd_wrap(qp.H)) + qp.g @ x + penalty
-        cp.Problem(cp.Minimize(cost), [qp.A @ x == qp.b, qp.G[~soft] @ x <= qp.h[~soft]]).solve(
-            solver=cp.CLARABEL
-        )
+        rows = [qp.A @ x == qp.b, qp.G[~soft] @ x <= qp.h[~soft]]
+        cp.Problem(cp.Minimize(cost), rows).solve(solver=cp.CLARABEL)
         found = solve(qp, solver)
         assert np.allclose(found.x, x.value, atol=1e-5)
         excess = qp.G @ found.x - qp.h

@@ -1,7 +1,5 @@
 """Payloads and scaled masses, against MuJoCo and closed forms."""
 
-from __future__ import annotations
-
 import pickle
 
 import judges

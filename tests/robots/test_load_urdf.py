@@ -2,8 +2,6 @@
 cannot be used.
 """
 
-from __future__ import annotations
-
 import pickle
 import warnings
 from pathlib import Path
@@ -20,11 +18,8 @@ from floatbase.errors import InputError, RobotWarning
 from floatbase.robots import PLATE_SIZE, with_floating_base
 
 LOADERS = example_robot_data.robots_loader.ROBOTS
-CHANGED = [
-    name
-    for name, loader in LOADERS.items()
-    if loader.__init__ is not example_robot_data.utils.RobotLoader.__init__
-]
+USUAL = example_robot_data.utils.RobotLoader.__init__
+CHANGED = [name for name, loader in LOADERS.items() if loader.__init__ is not USUAL]
 MODELS = sorted((Path(__file__).parents[2] / "assets" / "models").glob("*.urdf"))
 
 
@@ -106,12 +101,9 @@ def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name,
     for i, joint in list(enumerate(whole.names))[1:]:
         if joint not in locked:
             own = robot.model.getJointId(joint)
-            q[whole.idx_qs[i] :][: whole.nqs[i]] = state.q[robot.model.idx_qs[own] :][
-                : whole.nqs[i]
-            ]
-            v[whole.idx_vs[i] :][: whole.nvs[i]] = state.v[robot.model.idx_vs[own] :][
-                : whole.nvs[i]
-            ]
+            nq, nv, model = whole.nqs[i], whole.nvs[i], robot.model
+            q[whole.idx_qs[i] :][:nq] = state.q[model.idx_qs[own] :][:nq]
+            v[whole.idx_vs[i] :][:nv] = state.v[model.idx_vs[own] :][:nv]
             kept += range(whole.idx_vs[i], whole.idx_vs[i] + whole.nvs[i])
     data, judge = whole.createData(), judges.Mujoco(robot).move_to(state)
     assert robot.nv == whole.nv - len(locked) == len(kept) and judge.model.neq == 0
@@ -124,14 +116,11 @@ def test_locked_joints_are_still_and_the_others_move_as_in_the_whole_robot(name,
 
 
 def test_a_joint_is_locked_only_where_it_can_be():
-    for kind, posture, *numbers in (
-        ("continuous", [2.0, 0.0], 2),
-        ("revolute", [10.0], 10, 0.5, 2),
-    ):
+    cases = ("continuous", [2.0, 0.0], 2), ("revolute", [10.0], 10, 0.5, 2)
+    for kind, posture, *numbers in cases:
         with raises(InputError, "posture", "elbow", *numbers):
-            fb.load_urdf(
-                two_links(kind=kind), posture=[0.0] * 6 + [1.0, *posture], locked=["elbow"]
-            )
+            whole = [0.0] * 6 + [1.0, *posture]
+            fb.load_urdf(two_links(kind=kind), posture=whole, locked=["elbow"])
 
 
 def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice():
@@ -151,13 +140,7 @@ def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path):
 LIMIT = '<limit effort="5" velocity="9" lower="0.5" upper="2"/>'
 
 
-def two_links(
-    mass: object = 1.0,
-    iyy: object = 1.0,
-    joint: str = "elbow",
-    kind: str = "revolute",
-    extra: str = LIMIT,
-) -> str:
+def two_links(mass=1.0, iyy=1.0, joint="elbow", kind="revolute", extra=LIMIT):
     """A URDF: a base of 1 kg, and a link that a joint moves."""
     link = (
         '<link name="{}"><inertial><mass value="{}"/><inertia ixx="1" iyy="{}" izz="1" ixy="0" '
@@ -210,11 +193,8 @@ def test_a_urdf_that_1_to_7_cannot_hold_is_refused_by_name(urdf, named):
 
 
 def test_a_joint_that_bolts_the_base_may_be_called_base_and_limits_that_are_equal_are_none():
-    bolted = (
-        two_links(joint="base", kind="fixed")
-        .replace('"base"', '"a"', 1)
-        .replace('k="base"', 'k="a"')
-    )
+    bolted = two_links(joint="base", kind="fixed").replace('"base"', '"a"', 1)
+    bolted = bolted.replace('k="base"', 'k="a"')
     robot = fb.load_urdf(bolted.replace("</robot>", "") + HUNG, floating=False)
     assert robot.base == "a" and robot.model.frames[robot.frame_id("base")].parentJoint == 0
     assert abs(robot.random_state(0, spread=3.0).q[0]) > 0.0

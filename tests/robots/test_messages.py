@@ -1,7 +1,5 @@
 """What robots, states and names refuse: the type of each error, and the names and numbers in it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import judges
@@ -21,7 +19,7 @@ Q = GO2.standing().q
 UPSIDE_DOWN = np.array([*Q[:3], 0.0, 0.0, 0.0, 0.0, *Q[7:]])  # a quaternion of no length
 
 
-def with_entry(value: np.ndarray, at: int, entry: float) -> np.ndarray:
+def with_entry(value, at, entry):
     changed = np.array(value)
     changed[at] = entry
     return changed
@@ -100,23 +98,18 @@ def test_all_errors_of_the_package_can_be_caught_by_one_name():
 def test_unknown_names_list_the_near_ones_or_all_of_a_few():
     near = str(unknown_name("frame", "FL_fot", ["FL_foot", "base", "x", "y", "z", "w", "v"]))
     assert not missing(near, "FL_fot", "FL_foot") and missing(near, "base") == ["base"]
-    assert not missing(
-        str(unknown_name("frame", "left", ["foot_left", "base"])), "left", "foot_left"
-    )
-    assert not missing(
-        str(unknown_name("solver", "osqp", ["daqp", "cvxpy"])), "osqp", "daqp", "cvxpy"
-    )
-    many = str(
-        unknown_name(
-            "frame", "??", [f"frame {i}" for i in range(50)], "robot.frames lists them all."
-        )
-    )
+    frame = unknown_name("frame", "left", ["foot_left", "base"])
+    assert not missing(str(frame), "left", "foot_left")
+    solver = unknown_name("solver", "osqp", ["daqp", "cvxpy"])
+    assert not missing(str(solver), "osqp", "daqp", "cvxpy")
+    frames = [f"frame {i}" for i in range(50)]
+    many = str(unknown_name("frame", "??", frames, "robot.frames lists them all."))
     assert not missing(many, "frame 0") and missing(many, "frame 49")
     assert many.endswith(" robot.frames lists them all.")
 
 
 class Unprintable:
-    def __repr__(self) -> str:
+    def __repr__(self):
         raise RuntimeError
 
 

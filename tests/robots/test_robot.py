@@ -1,7 +1,5 @@
 """A robot: its numbers, its feet, its actuation matrix, the postures it stands in."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 
 import example_robot_data
@@ -19,12 +17,12 @@ from floatbase.lessons import joint_servo
 
 
 @pytest.fixture(params=judges.ROBOTS)
-def robot(request: pytest.FixtureRequest) -> fb.Robot:
+def robot(request):
     return judges.load(request.param)
 
 
 @pytest.fixture(params=judges.FLOATING)
-def floating(request: pytest.FixtureRequest):
+def floating(request):
     return judges.load(request.param)
 
 
@@ -43,11 +41,7 @@ def test_a_floating_base_adds_six_velocities_that_no_motor_drives(robot):
 
 def test_the_mass_is_the_sum_of_the_links_of_the_urdf(robot):
     root = ElementTree.fromstring(robot.urdf)
-    masses = [
-        float(mass.get("value"))
-        for link in root.findall("link")
-        for mass in link.findall("inertial/mass")
-    ]
+    masses = [float(mass.get("value")) for mass in root.findall("link/inertial/mass")]
     assert robot.mass == pytest.approx(sum(masses), rel=1e-9)
     assert robot.weight == pytest.approx(9.81 * sum(masses), rel=1e-9)
 
@@ -66,10 +60,8 @@ def test_torque_limits_are_positive_and_equal_the_urdfs_unless_another_source_is
     assert robot.torque_limits.shape == (robot.d,)
     joints = {j.get("name"): j for j in ElementTree.fromstring(robot.urdf).findall("joint")}
     urdf = [float(joints[name].find("limit").get("effort")) for name in robot.joint_names]
-    if (
-        robot.sources["torque limits" if "torque limits" in robot.sources else "torque limit"]
-        == "URDF"
-    ):
+    limits = "torque limits" if "torque limits" in robot.sources else "torque limit"
+    if robot.sources[limits] == "URDF":
         assert np.allclose(robot.torque_limits, urdf)
     else:
         assert np.all(robot.torque_limits < urdf)
@@ -124,11 +116,8 @@ def test_a_reference_posture_beyond_a_limit_is_moved_by_a_whole_turn_where_that_
     elbow = robot.model.idx_qs[robot.model.getJointId("j2s6s200_joint_3")]
     assert theirs.q0[elbow] < robot.model.lowerPositionLimit[elbow] <= robot.posture[elbow]
     for frame in robot.frames:
-        assert (
-            robot.standing()
-            .frame_pose(frame)
-            .isApprox(data.oMf[theirs.model.getFrameId(frame)], 1e-9)
-        )
+        placed = data.oMf[theirs.model.getFrameId(frame)]
+        assert robot.standing().frame_pose(frame).isApprox(placed, 1e-9)
 
 
 def test_a_robot_without_joints_falls_under_every_controller():
@@ -156,11 +145,8 @@ def test_joints_of_standing_and_random_states_keep_their_limits(robot):
         for joint in range(1, model.njoints):
             if model.nqs[joint] == 1:
                 at = model.idx_qs[joint]
-                assert (
-                    model.lowerPositionLimit[at] - 1e-9
-                    <= state.q[at]
-                    <= model.upperPositionLimit[at] + 1e-9
-                )
+                lower, upper = model.lowerPositionLimit[at], model.upperPositionLimit[at]
+                assert lower - 1e-9 <= state.q[at] <= upper + 1e-9
 
 
 def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robot):

@@ -1,11 +1,7 @@
 """States: validated, immutable, and with frames in the world where MuJoCo has them."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from operator import attrgetter, methodcaller
-from typing import Any
 
 import judges
 import numpy as np
@@ -66,12 +62,10 @@ def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_deriva
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
         expected = judges.jacobian_of(lambda s: s.com, state)
         assert np.allclose(state.com_jacobian, expected, atol=1e-7)
-        assert np.allclose(
-            state.com_velocity, judges.derivative(lambda s: s.com, state, state.v), atol=1e-7
-        )
-        assert np.allclose(
-            state.com_drift, judges.drift_of(lambda s: s.com_jacobian, state), atol=1e-7
-        )
+        velocity = judges.derivative(lambda s: s.com, state, state.v)
+        assert np.allclose(state.com_velocity, velocity, atol=1e-7)
+        drift = judges.drift_of(lambda s: s.com_jacobian, state)
+        assert np.allclose(state.com_drift, drift, atol=1e-7)
 
 
 def test_base_velocity_is_given_in_the_base_frame():
@@ -119,12 +113,10 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name):
     """Pinocchio's algorithms write to one memory: none may change what another has left there."""
     robot = judges.load(name)
     parts = ("M", "h", "com", "com_velocity", "com_drift", "com_jacobian", "joint_transforms")
-    questions: list[Callable[[fb.State], Any]] = [attrgetter(part) for part in parts]
+    questions = [attrgetter(part) for part in parts]
     for frame in ("base", robot.frames[-1]):
-        of_frame = (
-            methodcaller(ask, frame)
-            for ask in ("point", "frame_jacobian", "frame_velocity", "frame_drift")
-        )
+        asked = ("point", "frame_jacobian", "frame_velocity", "frame_drift")
+        of_frame = (methodcaller(ask, frame) for ask in asked)
         questions += [*of_frame, lambda s, frame=frame: s.frame_pose(frame).homogeneous]
     alone = [[ask(robot.random_state(seed)) for ask in questions] for seed in (5, 6)]
     rng = np.random.default_rng(0)
@@ -141,7 +133,7 @@ def test_threads_may_ask_the_same_state(name):
     states = [robot.random_state(seed) for seed in range(4)]
     expected = [robot.random_state(seed).frame_drift("base") for seed in range(4)]
 
-    def ask(i: int) -> bool:
+    def ask(i):
         return np.array_equal(states[i % 4].frame_drift("base"), expected[i % 4])
 
     with ThreadPoolExecutor(4) as threads:
@@ -163,13 +155,12 @@ def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(name):
     robot, step = judges.load(name), 1e-6
     state = robot.random_state(3, 0.3)
 
-    def momentum(q: np.ndarray) -> np.ndarray:
+    def momentum(q):
         data = robot.model.createData()
         return pin.computeCentroidalMomentum(robot.model, data, q, state.v).vector
 
-    rate = (
-        momentum(state.integrate(step * state.v)) - momentum(state.integrate(-step * state.v))
-    ) / (2.0 * step)
+    after, before = (state.integrate(way * step * state.v) for way in (1, -1))
+    rate = (momentum(after) - momentum(before)) / (2.0 * step)
     assert np.allclose(state.centroidal_matrix @ state.v, momentum(state.q), atol=1e-10)
     assert np.allclose(state.centroidal_drift, rate, atol=1e-5)
     linear = sum(inertia.mass for inertia in robot.model.inertias) * state.com_velocity

@@ -1,16 +1,11 @@
 """Robots and windows for the viewer's tests, and a page of a real browser if there is one."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 import pytest
 from browsers import launched
 
 from floatbase.dynamics import Contacts
-from floatbase.robots import Robot, State, load
+from floatbase.robots import load
 from floatbase.viewer import Viewer
 from floatbase.viewer.transport.window import Window
 
@@ -18,22 +13,22 @@ from .looks import CONTEXTS, SIZE
 
 
 @pytest.fixture(scope="session")
-def go2() -> Robot:
+def go2():
     return load("go2")
 
 
 @pytest.fixture(scope="session")
-def standing(go2: Robot) -> State:
+def standing(go2):
     return go2.standing()
 
 
 @pytest.fixture
-def contacts(go2: Robot) -> Contacts:
+def contacts(go2):
     return Contacts.points(go2, mu=0.6)
 
 
 @pytest.fixture
-def forces(go2: Robot) -> np.ndarray:
+def forces(go2):
     """A quarter of the weight on each foot: inside its cone, on it, outside, inside."""
     quarter = go2.weight / 4
     tangent = np.array([0.1, 0.6, 0.9, 0.0])
@@ -41,25 +36,25 @@ def forces(go2: Robot) -> np.ndarray:
 
 
 @pytest.fixture
-def window() -> Iterator[Window]:
+def window():
     with Window() as opened:
         yield opened
 
 
 @pytest.fixture
-def viewer(go2: Robot) -> Iterator[Viewer]:
+def viewer(go2):
     view = Viewer(go2)
     yield view
     view.close()
 
 
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Any]:
+def browser():
     yield from launched(f"--max-active-webgl-contexts={CONTEXTS}")
 
 
 @pytest.fixture(scope="package")
-def tab(browser) -> Iterator[Any]:
+def tab(browser):
     """Open one page for all tests: a new page takes three times as long as a new address in it."""
     opened = browser.new_page()
     yield opened
@@ -67,9 +62,9 @@ def tab(browser) -> Iterator[Any]:
 
 
 @pytest.fixture
-def page(tab) -> Iterator[Any]:
+def page(tab):
     """Return the page, which fails the test if its script fails."""
-    errors: list[str] = []
+    errors = []
     hears = {
         "pageerror": lambda error: errors.append(str(error)),
         "console": lambda line: (

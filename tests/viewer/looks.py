@@ -1,16 +1,11 @@
 """Screenshots for the browser tests, kept in build/screenshots, and access to the page's scene."""
 
-from __future__ import annotations
-
 import io
-from collections.abc import Callable
 
 import numpy as np
 from browsers import SCREENSHOTS
 from PIL import Image
 from waiting import until
-
-from floatbase.viewer import Item
 
 SIZE = {"width": 900, "height": 600}
 SMALL = {"width": 450, "height": 300}  # where few pixels do: the tests draw without a graphics card
@@ -26,17 +21,17 @@ WHERE = """(path) => {
 DRAWN = "window.viewer && viewer.num_messages_received > 0 && !viewer.needs_render"
 
 
-def control(page, name: str, call: str) -> None:
+def control(page, name, call):
     """Use a control of the page: `setValue(0.5)` of a slider, `fire()` of a button."""
     page.evaluate(f"viewer.gui_controllers['{name}'].{call}")
 
 
-def eventually(page, condition: Callable[[], object]) -> None:
+def eventually(page, condition):
     """Wait until a condition holds, while the page works."""
     until(condition, lambda: page.wait_for_timeout(20))
 
 
-def settle(page, title: str | None = None) -> None:
+def settle(page, title=None):
     """Wait until the page has drawn, with this title if one is given."""
     titled = (
         "" if title is None else f" && document.getElementById('title').textContent == '{title}'"
@@ -44,14 +39,14 @@ def settle(page, title: str | None = None) -> None:
     page.wait_for_function(DRAWN + titled)
 
 
-def picture(page, name: str) -> np.ndarray:
+def picture(page, name):
     """Take and keep a screenshot, shape (height, width, 3)."""
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)
     data = page.screenshot(path=str(SCREENSHOTS / f"{name}.png"))
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 
-def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
+def hue_pixels(image, colour):
     """Count the pixels with the colour's hue, whatever the light."""
     expected = np.array(colour) - np.mean(colour)
     have = image - image.mean(axis=2, keepdims=True)
@@ -60,7 +55,7 @@ def hue_pixels(image: np.ndarray, colour: tuple[float, float, float]) -> int:
     return int(np.sum((aligned > 0.97) & (length > 25)))
 
 
-def vertices(item: Item) -> np.ndarray:
+def vertices(item):
     """Return the vertices of an item, (n, 3), in the world frame [m]."""
     (packed,) = item.shape.data["geometries"]
     raw = packed["data"]["attributes"]["position"]

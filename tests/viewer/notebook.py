@@ -1,15 +1,11 @@
 """Notebooks without Jupyter: simulated pages of a widget, and a web page that shows widgets."""
 
-from __future__ import annotations
-
 import asyncio
 import base64
 import json
 import queue
 import threading
-from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import tornado.httpserver
@@ -21,10 +17,10 @@ from waiting import PATIENCE
 from .test_window import commands_in
 
 SILENCE = 0.3  # s without a message
-_CLIENTS: WeakKeyDictionary[Any, list[Client]] = WeakKeyDictionary()  # of each widget
+_CLIENTS = WeakKeyDictionary()  # of each widget
 
 
-def hear(widget: Any, content: Any) -> None:
+def hear(widget, content):
     """Deliver a message of a page to a widget."""
     widget.comm.handle_msg(
         {"content": {"data": {"method": "custom", "content": content}}, "buffers": []}
@@ -38,10 +34,10 @@ class Client:
     messages, and so only between cells.
     """
 
-    def __init__(self, widget: Any, name: str = "page", in_cell: bool = False, hello: bool = True):
+    def __init__(self, widget, name="page", in_cell=False, hello=True):
         self.widget, self.name, self.in_cell = widget, name, in_cell
-        self.messages: queue.Queue[tuple[dict[str, Any], list[bytes]]] = queue.Queue()
-        clients: list[Client] = _CLIENTS.setdefault(widget, [])
+        self.messages = queue.Queue()
+        clients = _CLIENTS.setdefault(widget, [])
         clients[:] = [client for client in clients if client.name != name] + [self]
         widget.send = lambda content, buffers=None: [
             client.take(content, buffers or []) for client in clients
@@ -49,8 +45,8 @@ class Client:
         if hello:
             self.say("hello")
 
-    def say(self, words: str) -> None:
-        def speak() -> None:
+    def say(self, words):
+        def speak():
             hear(self.widget, {"page": self.name, "say": words})
 
         if self.in_cell:
@@ -60,28 +56,28 @@ class Client:
             thread.start()
             thread.join()
 
-    def take(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+    def take(self, content, buffers):
         if content.get("page", self.name) == self.name:
             self.messages.put((content, buffers))
 
-    def message(self) -> tuple[dict[str, Any], list[bytes]]:
+    def message(self):
         return self.messages.get(timeout=PATIENCE)
 
-    def frame(self) -> tuple[int, list[dict]]:
+    def frame(self):
         """Return number and commands of the next frame, without answering it."""
         content, (data,) = self.message()
         return content["frame"], commands_in(data)
 
-    def commands(self) -> list[dict]:
+    def commands(self):
         """Return the commands of the next frame, and answer that it is drawn."""
         number, commands = self.frame()
         self.drawn(number)
         return commands
 
-    def drawn(self, number: int) -> None:
+    def drawn(self, number):
         self.say(json.dumps({"type": "done", "number": number}))
 
-    def hears_nothing(self) -> bool:
+    def hears_nothing(self):
         try:
             self.messages.get(timeout=SILENCE)
         except queue.Empty:
@@ -138,20 +134,20 @@ class Notebook:
     arrive.
     """
 
-    def __init__(self) -> None:
-        self.widgets: dict[str, Any] = {}
-        self.sizes: list[int] = []
+    def __init__(self):
+        self.widgets = {}
+        self.sizes = []
         self.lose = 0
-        self.sockets: dict[str, list[_Comm]] = {}
-        self._said: list[tuple[Any, Any]] | None = None
-        self._newest: tuple[str, dict[str, Any], list[bytes]] | None = None
+        self.sockets = {}
+        self._said = None
+        self._newest = None
         self._loop = asyncio.new_event_loop()
         self._listening = tornado.netutil.bind_sockets(0, "127.0.0.1")
         self.url = f"http://127.0.0.1:{self._listening[0].getsockname()[1]}/"
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def _run(self) -> None:
+    def _run(self):
         asyncio.set_event_loop(self._loop)
         own = {"notebook": self}
         pages = [
@@ -167,16 +163,14 @@ class Notebook:
         self._loop.run_forever()
         server.stop()
 
-    def show(self, page: Any, widget: Any) -> Any:
+    def show(self, page, widget):
         """Put an output below the others; return its frame."""
         self.widgets[widget.model_id] = widget
         widget.send = lambda content, buffers=None: self._send(
             widget.model_id, content, buffers or []
         )
-        widget.observe(
-            lambda _: self._send(widget.model_id, {"trait": "is_live", "value": False}, []),
-            names="is_live",
-        )
+        over = {"trait": "is_live", "value": False}
+        widget.observe(lambda _: self._send(widget.model_id, over, []), names="is_live")
         state = {name: getattr(widget, name) for name in ("version", "name", "height", "is_live")}
         thumbnail = base64.b64encode(widget.thumbnail).decode()
         page.evaluate(
@@ -184,7 +178,7 @@ class Notebook:
         )
         return page.locator(".output").last.locator("iframe").element_handle().content_frame()
 
-    def _send(self, name: str, content: dict[str, Any], buffers: list[bytes]) -> None:
+    def _send(self, name, content, buffers):
         self.sizes += map(len, buffers)
         if "frame" in content:
             self._newest = name, content, buffers
@@ -198,12 +192,12 @@ class Notebook:
             lambda: [socket.write_message(text) for socket in self.sockets.get(name, [])]
         )
 
-    def send_again(self) -> None:
+    def send_again(self):
         """Send the newest frame once more."""
         assert self._newest is not None
         self._send(*self._newest)
 
-    def hear(self, widget: Any, content: Any) -> None:
+    def hear(self, widget, content):
         """Deliver a message of a page, now or later."""
         said = self._said
         if said is None:
@@ -212,7 +206,7 @@ class Notebook:
             said.append((widget, content))
 
     @contextmanager
-    def deaf(self) -> Iterator[list[tuple[Any, Any]]]:
+    def deaf(self):
         """Delay all messages of pages, like a kernel that runs a cell; deliver them afterwards."""
         said = self._said = []
         try:
@@ -221,31 +215,31 @@ class Notebook:
             self._said = None
         self._loop.call_soon_threadsafe(lambda: [hear(*each) for each in said])
 
-    def end(self) -> None:
+    def end(self):
         """End the connections, like a kernel that has stopped."""
         self._loop.call_soon_threadsafe(
             lambda: [one.close() for some in self.sockets.values() for one in some]
         )
 
-    def close(self) -> None:
+    def close(self):
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(PATIENCE)
 
 
 class _Page(tornado.web.RequestHandler):
-    def initialize(self, policy: str = "") -> None:
+    def initialize(self, policy=""):
         self.policy = policy
 
-    def get(self) -> None:
+    def get(self):
         self.set_header("Content-Security-Policy", self.policy)
         self.finish(_PAGE)
 
 
 class _Code(tornado.web.RequestHandler):
-    def initialize(self, notebook: Notebook) -> None:
+    def initialize(self, notebook):
         self.notebook = notebook
 
-    def get(self) -> None:
+    def get(self):
         """The widget's own, which is the same for all; the page asks for it when the first one is
         shown.
         """
@@ -255,18 +249,18 @@ class _Code(tornado.web.RequestHandler):
 
 
 class _Comm(tornado.websocket.WebSocketHandler):
-    def initialize(self, notebook: Notebook) -> None:
+    def initialize(self, notebook):
         self.notebook = notebook
 
-    def check_origin(self, origin: str) -> bool:
+    def check_origin(self, origin):
         return True
 
-    def open(self, *_: str, **__: str) -> None:
+    def open(self, *_, **__):
         self.name = self.get_query_argument("id")
         self.notebook.sockets.setdefault(self.name, []).append(self)
 
-    def on_message(self, message: str | bytes) -> None:
+    def on_message(self, message):
         self.notebook.hear(self.notebook.widgets[self.name], json.loads(message))
 
-    def on_close(self) -> None:
+    def on_close(self):
         self.notebook.sockets[self.name].remove(self)

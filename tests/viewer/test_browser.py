@@ -1,7 +1,5 @@
 """The page in a real browser. Screenshots go to build/screenshots."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np
@@ -38,9 +36,8 @@ def test_a_page_has_what_is_shown(page, viewer, standing, contacts, forces):
 
     viewer.show(standing, com=False, title="bare")
     settle(page, "bare")
-    assert (
-        page.evaluate("Object.keys(viewer.scene_tree.find(['meshcat', 'measured']).children)") == []
-    )
+    measured = "viewer.scene_tree.find(['meshcat', 'measured'])"
+    assert page.evaluate(f"Object.keys({measured}.children)") == []
     page.wait_for_timeout(1500)  # the legend keeps an entry for a second
     image = picture(page, "go2_bare")
     for colour in (MEASURED, WARNING, ALARM, COM):
@@ -74,7 +71,7 @@ VALUES = (
 
 @pytest.mark.front_end
 def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser, viewer):
-    heard: defaultdict[str, list[object]] = defaultdict(list)
+    heard = defaultdict(list)
     for name in NAMES:
         box, button = f"box {name}", f"button {name}"
         viewer.add_slider(name, heard[name].append, 0.0, -1.0, 1.0)
@@ -123,9 +120,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
     ],
     ids=["WebGL", "DecompressionStream"],
 )
-def test_a_page_names_what_its_browser_lacks(
-    browser, viewer, standing, tmp_path, lacks, pages, words
-):
+def test_pages_name_what_browsers_lack(browser, viewer, standing, tmp_path, lacks, pages, words):
     viewer.show(standing)
     addresses = {"live": viewer.url, "file": viewer.save(tmp_path / "scene.html").as_uri()}
     page = browser.new_page(viewport=SMALL)

@@ -1,7 +1,5 @@
 """Films and images: what they show, and errors if they cannot be made."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from contextlib import closing
@@ -25,11 +23,10 @@ SOME = 20  # of 255: by which a pixel is another
 
 
 @pytest.fixture(scope="module")
-def view(request: pytest.FixtureRequest) -> fb.Viewer:
+def view(request):
     robot = fb.load("go2")
-    controller = fb.WholeBodyController(
-        robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
-    )
+    tasks = fb.standing_tasks(robot.standing())
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
     run = fb.rollout(fb.Simulation(robot), controller, 0.2, [Push((0.0, 400.0, 0.0), 0.05, 0.1)])
     view = fb.Viewer(robot)
     view.play(run, speed=0.5, follow=False)
@@ -48,7 +45,7 @@ def test_a_film_that_would_take_hours_is_refused(tmp_path):
     view.close()
 
 
-def share_of_others(first: np.ndarray, second: np.ndarray) -> float:
+def share_of_others(first, second):
     """Return the fraction of the pixels that differ between two images."""
     return float(np.mean(np.abs(first.astype(int) - second).max(axis=2) > SOME))
 

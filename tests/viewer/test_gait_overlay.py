@@ -1,7 +1,5 @@
 """Gait overlay and the camera that follows a walk."""
 
-from __future__ import annotations
-
 import dataclasses
 from contextlib import closing
 
@@ -14,8 +12,8 @@ import floatbase as fb
 from floatbase.behaviours import Gait, Walk, capture_point
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
-from floatbase.robots import Robot, State
-from floatbase.simulation import Rollout, Simulation
+from floatbase.robots import State
+from floatbase.simulation import Simulation
 from floatbase.viewer import Viewer
 from floatbase.viewer.export import recording
 
@@ -28,7 +26,7 @@ SWING, START = 0.2, 0.3  # s
 
 
 @pytest.fixture(scope="module")
-def walked(go2: Robot) -> tuple[Rollout, Walk]:
+def walked(go2):
     """Return a trot of go2 with four swings; two feet are in the air at the end of the record."""
     gait = Gait.trot(go2, swing=SWING, start=START)
     walk = Walk(go2, Contacts.feet(go2, mu=0.6), gait, velocity=(0.2, 0.0))
@@ -37,7 +35,7 @@ def walked(go2: Robot) -> tuple[Rollout, Walk]:
 
 
 @pytest.fixture(scope="module")
-def biped() -> tuple[Rollout, Walk]:
+def biped():
     """Return a walk of talos that turns left; one foot is in the air at the end of the record."""
     robot = fb.load("talos")
     gait = Gait.walk(robot, start=0.1)

@@ -1,16 +1,11 @@
 """Interaction with the picture: wheel, touch, initial view, keys, hidden parts, reduced motion."""
 
-from __future__ import annotations
-
 from contextlib import closing
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from floatbase import Contacts
-from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
 
 from .looks import picture
@@ -23,7 +18,7 @@ SCENE = "viewer.scene_tree.children.meshcat.children"
 
 
 @pytest.fixture
-def framed(page, go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> tuple:
+def framed(page, go2, standing, contacts, tmp_path):
     """Open a page that scrolls, with a saved picture in a frame from 300 to 780 pixels."""
     forces = np.tile([5.0, 0.0, 40.0], 4)
     with closing(Viewer(go2, facets=4)) as view:
@@ -68,7 +63,7 @@ def test_views_parts_and_keys(framed):
     inner.evaluate("document.querySelector('#tools details').open = true")
     picture(page, "tools")
 
-    def click(kind: str, text: str) -> None:
+    def click(kind, text):
         nodes = f"[...document.querySelectorAll('#tools {kind}')]"
         inner.evaluate(f"{nodes}.find((one) => one.textContent == '{text}').click()")
 

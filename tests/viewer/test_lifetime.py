@@ -3,8 +3,6 @@
 Nothing may hang, grow or remain.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -12,8 +10,6 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
-from typing import Any
 
 import msgpack
 import numpy as np
@@ -24,7 +20,6 @@ from jupyter_client.manager import start_new_kernel
 from waiting import PATIENCE, until
 
 from floatbase.viewer.scene import protocol
-from floatbase.viewer.transport.window import Window
 
 from .test_window import window_threads
 
@@ -33,12 +28,12 @@ MB = 1 << 20
 HUNG = 5.0
 
 
-def memory() -> int:
+def memory():
     """Return the memory of this process in bytes."""
     return int(psutil.Process().memory_info().rss)
 
 
-def answers(port: int) -> bool:
+def answers(port):
     """Return whether anything listens on a port."""
     try:
         socket.create_connection(("127.0.0.1", port), timeout=2).close()
@@ -81,7 +76,7 @@ def test_a_killed_browser_leaves_nothing_behind(viewer, go2, standing, contacts,
 
 
 @pytest.fixture
-def sleeper(window: Window) -> Iterator[socket.socket]:
+def sleeper(window):
     """Open a page that connects and never reads."""
     with socket.create_connection(("127.0.0.1", window.port)) as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -99,7 +94,7 @@ def sleeper(window: Window) -> Iterator[socket.socket]:
 def test_updates_for_a_page_that_never_reads_take_no_memory(window, sleeper):
     (_, command) = protocol.set_object("/meshcat/a", msgpack.packb({"data": "x" * 20_000}))
 
-    def draw(n: int) -> None:
+    def draw(n):
         for i in range(n):
             path = f"/meshcat/{i % 5}"
             shape = ((path, "set_object", ""), command)
@@ -121,7 +116,7 @@ def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
     files = len(os.listdir("/proc/self/fd"))
 
-    def drawn_and_gone() -> bool:
+    def drawn_and_gone():
         window.put([protocol.set_transform("/meshcat/a", np.eye(4))])
         return window.n_pages == 0
 
@@ -132,17 +127,17 @@ def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):
 class Kernel:
     """A separate Jupyter kernel."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.manager, self.client = start_new_kernel(kernel_name="python3")
 
-    def run(self, code: str) -> str:
+    def run(self, code):
         """Run code; return what it prints, and the name of its error."""
         return "".join(self.told(self.client.execute(code)))
 
-    def told(self, request: str) -> Iterator[str]:
+    def told(self, request):
         """Yield what a request prints, and the name of its error, until it is finished."""
         while True:
-            message: dict[str, Any] = self.client.get_iopub_msg(timeout=PATIENCE)
+            message = self.client.get_iopub_msg(timeout=PATIENCE)
             if message["parent_header"].get("msg_id") != request:
                 continue
             content = message["content"]
@@ -153,7 +148,7 @@ class Kernel:
             elif message["msg_type"] == "status" and content["execution_state"] == "idle":
                 return
 
-    def close(self) -> None:
+    def close(self):
         self.client.stop_channels()
         self.manager.shutdown_kernel(now=True)
 

@@ -1,8 +1,5 @@
 """Rings at joints near a position limit and at joints whose limit is active."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,10 +11,10 @@ from messages import refused
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
-from floatbase.control import Command, JointLimits
+from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
-from floatbase.robots import Robot, State, load
+from floatbase.robots import State, load
 from floatbase.viewer import Viewer
 from floatbase.viewer.export.recording import joint_limits_at
 from floatbase.viewer.scene.colours import ALARM, WARNING
@@ -28,40 +25,40 @@ from .test_recording import tracks
 JOINT = "FL_calf_joint"
 
 
-def at_fraction(robot: Robot, joint: str, fraction: float) -> State:
+def at_fraction(robot, joint, fraction):
     """Return the standing state with a joint at a fraction of its range."""
     i, limits, q = robot.joint_names.index(joint), JointLimits.of(robot), robot.standing().q.copy()
     q[robot.nq - robot.d + i] = (1.0 - fraction) * limits.lower[i] + fraction * limits.upper[i]
     return State(robot, q)
 
 
-def rings(paths: Iterable[str]) -> dict[str, str]:
+def rings(paths):
     """Return the kind of each joint's ring."""
     parts = (path.split("/") for path in paths if "_limit/" in path)
     return {joint: kind for kind, joint in parts}
 
 
-def owners(command: Command) -> set[str]:
+def owners(command):
     """Return the joints with an active limit, from the multipliers."""
     ends = ("position limit", "velocity limit")
     return {label.owner for label in command.active if label.kind.endswith(ends)}
 
 
 @pytest.fixture(scope="module")
-def commands() -> list[Command]:
+def commands():
     """Commands of the controller in `stretched`."""
     return []
 
 
 @pytest.fixture(scope="module")
-def stretched(go2: Robot, commands: list[Command]) -> fb.Rollout:
+def stretched(go2, commands):
     """A run in which the robot rises until its knees are at their limits."""
     standing, contacts = go2.standing(), Contacts.points(go2, mu=0.7)
     rise = fb.CoMTask(standing.com + [0.0, 0.0, 0.3])
     tasks = [rise if isinstance(t, fb.CoMTask) else t for t in fb.standing_tasks(standing)]
     controller = fb.WholeBodyController(go2, contacts, tasks)
 
-    def record(q: np.ndarray, v: np.ndarray, t: float) -> Command:
+    def record(q, v, t):
         commands.append(controller(q, v, t))
         return commands[-1]
 

@@ -1,11 +1,8 @@
 """The page of the command line: a live robot without a notebook."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from threading import Event
@@ -18,7 +15,7 @@ from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_connected
 from floatbase.playground import Playground, RealTimeFactor
-from floatbase.robots import Robot, catalogue, load
+from floatbase.robots import catalogue, load
 
 from .looks import control, eventually, picture
 
@@ -94,7 +91,7 @@ def test_the_end_of_the_program_ends_the_wait_for_a_page(go2):
 
 
 @pytest.fixture
-def playground(go2: Robot) -> Iterator[Playground]:
+def playground(go2):
     started = Playground(go2)
     started.start()
     yield started
@@ -104,7 +101,7 @@ def playground(go2: Robot) -> Iterator[Playground]:
 def test_the_controls_reach_the_robot(page, playground, go2):
     session, run = playground.session, playground.run
 
-    def drawn() -> set[str]:
+    def drawn():
         return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
 
     page.goto(playground.url)
@@ -128,7 +125,7 @@ def test_the_controls_reach_the_robot(page, playground, go2):
 
 @pytest.mark.front_end
 def test_the_page_makes_the_robot_walk_and_stand_where_it_is(page, playground):
-    def place() -> np.ndarray:
+    def place():
         return playground.session.last.final.com if playground.session.last else np.zeros(3)
 
     page.goto(playground.url)

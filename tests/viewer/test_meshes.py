@@ -1,7 +1,5 @@
 """Light meshes: their size, their similarity to the originals, and what is shown without them."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

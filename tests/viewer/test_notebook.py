@@ -1,15 +1,11 @@
 """The picture in a notebook: frame rates, busy kernels, slow or foreign pages, saved output."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from typing import Any
 
 import nbformat
 import numpy as np
@@ -50,15 +46,15 @@ LOADS = """() => {
 NOTICE = "getComputedStyle(document.getElementById('notice')).display"
 
 
-def put(window: Window, number: float) -> None:
+def put(window, number):
     window.put([protocol.set_transform("/meshcat/a", np.eye(4) * number)])
 
 
-def newest(commands: list[dict]) -> float:
+def newest(commands):
     return float(commands[-1]["matrix"][0])
 
 
-def shown(window: Window, in_cell: bool = False) -> Client:
+def shown(window, in_cell=False):
     """Return a page that has drawn the first frame."""
     put(window, 0)
     client = Client(window.widget("a", 100), in_cell=in_cell)
@@ -66,7 +62,7 @@ def shown(window: Window, in_cell: bool = False) -> Client:
     return client
 
 
-def draw_for(window: Window, seconds: float) -> int:
+def draw_for(window, seconds):
     """Draw something new repeatedly; return how often."""
     drawn, until_then = 0, time.monotonic() + seconds
     while time.monotonic() < until_then:
@@ -76,7 +72,7 @@ def draw_for(window: Window, seconds: float) -> int:
     return drawn
 
 
-def frames_of(client: Client) -> int:
+def frames_of(client):
     """Return how many frames have arrived by now."""
     time.sleep(2 * BLIND)
     return sum("frame" in client.messages.get()[0] for _ in range(client.messages.qsize()))
@@ -109,20 +105,20 @@ def test_a_page_that_answers_gets_the_pace_and_no_more(window):
 
 
 @pytest.fixture
-def shell() -> Iterator[InteractiveShell]:
+def shell():
     yield InteractiveShell.instance()
     InteractiveShell.clear_instance()
 
 
 @pytest.fixture
-def cell_window(shell: InteractiveShell) -> Iterator[Window]:
+def cell_window(shell):
     with Window() as opened:
         shell.events.trigger("post_run_cell", None)  # the cell that opened it
         yield opened
 
 
 @contextmanager
-def busy(shell: InteractiveShell) -> Iterator[None]:
+def busy(shell):
     """Run a cell."""
     shell.events.trigger("pre_run_cell", None)
     yield
@@ -158,7 +154,7 @@ def test_a_dropped_page_is_informed_and_can_come_back(window, monkeypatch):
     client = Client(window.widget("a", 100))
     client.frame()
 
-    def let_go() -> bool:
+    def let_go():
         put(window, 1)
         return window.n_pages == 0
 
@@ -231,7 +227,7 @@ def test_a_closed_window_informs_its_pages_once_and_new_ones_on_request(window):
 
 
 @pytest.fixture
-def notebook(page) -> Iterator[Notebook]:
+def notebook(page):
     page.set_viewport_size({"width": 450, "height": 400})
     opened = Notebook()
     page.goto(opened.url)
@@ -244,7 +240,7 @@ def notebook(page) -> Iterator[Notebook]:
 TITLE = "document.getElementById('title').textContent"
 
 
-def displayed(notebook: Notebook, page: Any, viewer: Viewer) -> Any:
+def displayed(notebook, page, viewer):
     """Display a viewer in the notebook; return its frame, when it has drawn."""
     frame = notebook.show(page, viewer.widget())
     frame.wait_for_function(DRAWN)
@@ -252,9 +248,7 @@ def displayed(notebook: Notebook, page: Any, viewer: Viewer) -> Any:
 
 
 @pytest.mark.front_end
-def test_pictures_of_one_page_share_the_code_and_one_that_lost_a_frame_gets_all_again(
-    notebook, page, standing
-):
+def test_pictures_share_code_and_one_that_lost_a_frame_gets_all_again(notebook, page, standing):
     viewer, *others = (Viewer(standing.robot, height=100) for _ in range(3))
     viewer.show(standing)
     frame, *_ = (displayed(notebook, page, view) for view in (viewer, *others))
@@ -306,9 +300,7 @@ def test_many_displays_share_the_few_contexts_that_a_browser_has(notebook, page,
 
 
 @pytest.mark.front_end
-def test_a_page_that_was_moved_while_a_cell_runs_loads_once_whatever_still_comes(
-    notebook, page, viewer, standing
-):
+def test_a_page_that_moves_while_a_cell_runs_loads_once(notebook, page, viewer, standing):
     frame = displayed(notebook, page, viewer.show(standing))
     viewer.show(standing, title="the second frame")
     frame.wait_for_function(f"{TITLE} == 'the second frame'")
@@ -341,9 +333,7 @@ def test_frames_arrive_whether_or_not_the_notebook_may_reach_into_the_picture(
 
 @pytest.mark.front_end
 @pytest.mark.parametrize("how", ["kernel", "window"])
-def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
-    notebook, page, viewer, standing, how
-):
+def test_a_picture_outlives_its_kernel_or_window(notebook, page, viewer, standing, how):
     frame = displayed(notebook, page, viewer.show(standing))
     assert frame.evaluate(NOTICE) == "none"
     notebook.end() if how == "kernel" else viewer.close()
@@ -352,9 +342,7 @@ def test_a_picture_stays_with_a_notice_when_its_kernel_or_its_window_is_gone(
     picture(page, f"notebook_without_{how}")
 
 
-def test_an_output_has_the_widget_and_an_image_or_on_request_the_scene(
-    viewer, standing, monkeypatch
-):
+def test_an_output_has_the_widget_and_an_image_or_the_scene(viewer, standing, monkeypatch):
     viewer.show(standing)
     data, _ = viewer._repr_mimebundle_()
     assert set(data) == {"application/vnd.jupyter.widget-view+json", "image/png", "text/plain"}

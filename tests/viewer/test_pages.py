@@ -1,7 +1,5 @@
 """The pages: the vendored files match their notice."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 

@@ -3,9 +3,6 @@
 It is also tested as a notebook shows it.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 
@@ -15,15 +12,7 @@ from waiting import until
 
 import floatbase as fb
 from floatbase.errors import FloatbaseError, InputError, UnknownNameError
-from floatbase.playground import (
-    CHALLENGES,
-    Challenge,
-    Playground,
-    Settings,
-    mean_force_error,
-    playground,
-)
-from floatbase.robots import Robot
+from floatbase.playground import CHALLENGES, Playground, Settings, mean_force_error, playground
 
 from .looks import control, eventually, picture
 
@@ -39,14 +28,14 @@ ENDS = """() => {
 
 
 @pytest.fixture
-def field(go2: Robot) -> Iterator[Playground]:
+def field(go2):
     started = Playground(go2)
     started.start()
     yield started
     started.close()
 
 
-def opened(page, field: Playground) -> None:
+def opened(page, field):
     page.goto(field.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")
 
@@ -138,7 +127,7 @@ def test_a_challenge_is_started_and_solved(page, field):
     picture(page, "playground_solved")
 
 
-def challenge(title: str) -> Challenge:
+def challenge(title):
     return next(challenge for challenge in CHALLENGES if challenge.title == title)
 
 
@@ -146,7 +135,7 @@ def test_a_wrong_mass_lowers_the_robot_and_the_right_one_lifts_it(page, field):
     """The plan lacks 0.5 m g. The CoM task makes up for it at an error of 0.5 g / kp = 49 mm."""
     opened(page, field)
 
-    def sunk() -> float:
+    def sunk():
         return float(field.robot.standing().com[2] - field.session.sim.state.com[2])
 
     control(page, "mass [%] reality", "setValue(150)")
@@ -198,7 +187,7 @@ def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field)
     first = (field.force, field.towards)
     changes = {"speed": 0.1, "push [N]": 200, "show forces": "false", "show gravity": "true"}
 
-    def shown() -> list:
+    def shown():
         opened(page, field)
         return [page.evaluate(f"viewer.gui_controllers['{name}'].getValue()") for name in changes]
 
@@ -249,7 +238,7 @@ def test_ctrl_z_undoes_a_change_of_the_page(page, field):
 
 
 def test_the_address_has_the_settings_and_sets_them(page, field):
-    def has(**settings: object) -> bool:
+    def has(**settings):
         return all(getattr(field.session.settings, name) == v for name, v in settings.items())
 
     opened(page, field)

@@ -1,7 +1,5 @@
 """Recordings, saved files and plots of a rollout made by hand, without physics."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 
@@ -16,9 +14,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatbase as fb
 from floatbase.dynamics import Contacts, LinearConstraint
 from floatbase.errors import InputError, ViewerError
-from floatbase.robots import Robot, State, catalogue, load
+from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Push, Rollout
-from floatbase.viewer import Picture, Viewer, plots
+from floatbase.viewer import Viewer, plots
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import ALARM, CONE, CONE_ALPHA
@@ -28,7 +26,7 @@ from .looks import SMALL, picture, settle, vertices
 matplotlib.use("agg")
 
 
-def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
+def record(robot, duration=2.0, walk=0.0):
     """The robot sways and leans harder on its front left foot, at 1 kHz; that foot slips in the
     middle and is pushed.
     """
@@ -52,7 +50,7 @@ def record(robot: Robot, duration: float = 2.0, walk: float = 0.0) -> Rollout:
     )  # fmt: skip
 
 
-def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]:
+def tracks(viewer):
     """Return times and values of every track in the scene."""
     found = {}
     for clip in viewer.window.scene.commands()["/", "set_animation", ""]["animations"]:
@@ -63,7 +61,7 @@ def tracks(viewer: Viewer) -> dict[tuple[str, str], tuple[np.ndarray, np.ndarray
     return found
 
 
-def numbers(packed: msgpack.ExtType | list[float]) -> np.ndarray:
+def numbers(packed):
     is_packed = isinstance(packed, msgpack.ExtType)
     return np.frombuffer(packed.data, "<f4") if is_packed else np.array(packed)
 
@@ -163,7 +161,7 @@ def test_facets_that_light_up_become_tracks(go2):
 
 
 def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer, go2, standing):
-    def drawn() -> dict:
+    def drawn():
         commands = viewer.window.scene.commands().items()
         return {key: value for key, value in commands if key[0].startswith("/meshcat")}
 
@@ -175,15 +173,13 @@ def test_the_next_picture_ends_the_animation_and_leaves_nothing_of_it(viewer, go
     assert drawn() == before
 
 
-def on_its_feet(robot: Robot) -> Contacts:
+def on_its_feet(robot):
     make = Contacts.flat_feet if robot.feet and robot.feet[0].is_flat else Contacts.points
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
 @pytest.mark.parametrize("name", judges.sampled(catalogue(), "talos"))
-def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_of_it_to_less_than_two(
-    name, tmp_path
-):
+def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_to_less_than_two(name, tmp_path):
     robot = load(name)
     viewer, contacts = Viewer(robot), on_its_feet(robot)
     n = contacts.n_points
@@ -268,9 +264,7 @@ def test_the_camera_goes_with_the_robot(page, viewer, go2, standing):
     assert after[0] - before[0] == pytest.approx(0.4, abs=STEP)
 
 
-def leaning(
-    viewer: Viewer, state: State, contacts: Contacts, tangents: list[float]
-) -> list[Picture]:
+def leaning(viewer, state, contacts, tangents):
     """Pictures of forces that lean forwards by so much of their normal part."""
     quarter = viewer.robot.weight / 4
     forces = [np.tile([tangent * quarter, 0.0, quarter], (4, 1)) for tangent in tangents]

@@ -1,11 +1,8 @@
 """Pictures of a state, read from the commands of the scene and not from the code that drew them."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from contextlib import closing
-from typing import Any
 from unittest.mock import Mock
 
 import hypothesis.strategies as st
@@ -19,13 +16,13 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, ViewerError
 from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Ground, Simulation
-from floatbase.viewer import PRESETS, Item, Picture, View, Viewer, shapes
+from floatbase.viewer import PRESETS, Item, View, Viewer, shapes
 from floatbase.viewer.scene.colours import ALARM, CALM, IDLE, WARNING
 
 from .looks import vertices
 
 
-def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
+def matrices(viewer, start):
     """Return the transforms in the scene by the rest of the path after `start`."""
     return {
         path.removeprefix(start): np.reshape(command["matrix"], (4, 4)).T
@@ -34,7 +31,7 @@ def matrices(viewer: Viewer, start: str) -> dict[str, np.ndarray]:
     }
 
 
-def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
+def colours(viewer, start):
     """Return the colours set in the scene, without opacity."""
     return {
         path.removeprefix(start).removesuffix("/surface").removesuffix("/sides"): tuple(
@@ -45,7 +42,7 @@ def colours(viewer: Viewer, start: str) -> dict[str, tuple[float, ...]]:
     }
 
 
-def paths(viewer: Viewer) -> set[str]:
+def paths(viewer):
     return {path for path, kind, _ in viewer.window.scene.commands() if kind == "set_object"}
 
 
@@ -74,9 +71,7 @@ def test_arrows_start_at_contacts(viewer, standing, contacts, forces, factor):
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.3, -0.2, 0.9), (1, 0, 0), (0, 0, -1)])
 @pytest.mark.parametrize("mu", [0.2, 0.6, 1.3])
-def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
-    viewer, go2, standing, normal, mu
-):
+def test_cones_open_by_mu_in_the_scale_of_the_forces(viewer, go2, standing, normal, mu):
     contacts = Contacts.points(go2, mu=mu, normals=normal)
     viewer.show(standing, contacts)
     cones = matrices(viewer, "/meshcat/cone/")
@@ -91,11 +86,8 @@ def test_cones_open_by_mu_around_the_normal_in_the_scale_of_the_forces(
 
 def test_the_colour_of_a_cone_shows_where_its_force_is(viewer, standing, contacts, forces):
     expected = dict(zip(contacts.point_names, (CALM, WARNING, ALARM, CALM), strict=True))
-    for shown in (
-        {"forces": forces},
-        {"planned": forces},
-        {"forces": forces, "planned": np.tile([0, 0, 30.0], 4)},
-    ):
+    upwards = np.tile([0, 0, 30.0], 4)
+    for shown in ({"forces": forces}, {"planned": forces}, {"forces": forces, "planned": upwards}):
         viewer.show(standing, contacts, **shown)
         assert colours(viewer, "/meshcat/cone/") == expected, shown
     viewer.show(standing, contacts, forces=-forces)
@@ -117,7 +109,7 @@ def test_a_cone_without_a_force_is_grey(go2, standing, contacts, facets):
             assert [found[name] for name in contacts.point_names] == expected
 
 
-def normal_and_point(viewer: Viewer) -> tuple[np.ndarray, np.ndarray]:
+def normal_and_point(viewer):
     """Return the normal of the ground in the scene, and a point on it."""
     ground = matrices(viewer, "/meshcat/ground")[""]
     return ground[:3, 2], ground[:3, 3]
@@ -228,11 +220,8 @@ def test_a_change_sends_only_what_changed(viewer, standing, contacts, forces):
 
 
 # the same few paths in many spellings, some below others
-PATHS = (
-    st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4)
-    .map("/".join)
-    .filter(lambda path: path.strip("/"))
-)
+PARTS = st.lists(st.sampled_from(["a", "b", ""]), min_size=1, max_size=4)
+PATHS = PARTS.map("/".join).filter(lambda path: path.strip("/"))
 ITEMS = st.builds(
     Item,
     st.sampled_from([shapes.label([0.0, 0.0, 0.0], text, 0.1).shape for text in "xy"]),
@@ -241,7 +230,7 @@ ITEMS = st.builds(
 )
 
 
-def scene_after(pictures: list[Picture]) -> dict[Any, Any]:
+def scene_after(pictures):
     with closing(Viewer(load("ur5"))) as viewer:
         for picture in pictures:
             viewer.draw(picture)
@@ -282,7 +271,7 @@ def test_the_scale_bar_is_as_long_as_the_force_on_its_label(viewer, standing, co
     )
 
 
-def legend(viewer: Viewer) -> list[str]:
+def legend(viewer):
     return [text for _, text, _ in viewer.window.scene.commands()["/", "set_legend", ""]["items"]]
 
 
@@ -302,7 +291,7 @@ def test_the_legend_explains_what_is_shown(viewer, standing, contacts, forces):
 
 
 def test_forces_that_are_not_drawn_still_colour_their_cones(viewer, standing, contacts, forces):
-    def cones() -> dict:
+    def cones():
         items = viewer.renderer.picture.items()
         return {path: item.colour for path, item in items if path.startswith("cone/")}
 
@@ -314,7 +303,7 @@ def test_forces_that_are_not_drawn_still_colour_their_cones(viewer, standing, co
 
 
 def test_a_view_chosen_before_the_first_picture_is_kept(go2, standing):
-    def eye(view: Viewer) -> list[float]:
+    def eye(view):
         return list(view.window.scene.commands()["/", "set_camera", ""]["position"])
 
     view = Viewer(go2).camera("left").show(standing)
@@ -325,7 +314,7 @@ def test_a_view_chosen_before_the_first_picture_is_kept(go2, standing):
 
 
 def test_only_a_call_of_camera_moves_the_camera_again(viewer, go2, standing):
-    def looked() -> int:
+    def looked():
         return viewer.window.scene.since(0)[0]
 
     viewer.show(standing)

@@ -1,7 +1,5 @@
 """Markers, props and figures: their numbers, from the items themselves, and their pictures."""
 
-from __future__ import annotations
-
 from itertools import combinations, pairwise
 
 import matplotlib.pyplot as plt
@@ -122,7 +120,7 @@ def test_a_turntable_turns_to_the_left_below_its_given_top():
 
 
 def test_the_cylinders_rod_reaches_its_end_and_its_piston_moves_with_it():
-    def middle(length: float) -> float:
+    def middle(length):
         items = props.hydraulic_cylinder([0, 0, 0], [0, 0, length], (0.3, 0.5))
         rod = items["/rod"].matrix
         assert rod[2, 3] + rod[2, 2] == pytest.approx(length)

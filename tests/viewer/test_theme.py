@@ -1,14 +1,7 @@
 """Light and dark: a picture follows the page around it, and everything is visible on both."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 
-from floatbase import Contacts
-from floatbase.robots import Robot, State
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene.colours import BACKGROUNDS, DARK_SHADES, MEASURED, hex_code
 
@@ -21,7 +14,7 @@ COLOUR = """(path) => '#' + viewer.scene_tree.find([...path.split("/"), "<object
 
 
 @pytest.fixture
-def saved(go2: Robot, standing: State, contacts: Contacts, tmp_path: Path) -> Iterator[Path]:
+def saved(go2, standing, contacts, tmp_path):
     view = Viewer(go2, facets=4)
     view.show(standing, contacts, forces=[[10.0, 0.0, 40.0]] * 4, labels=True, title="go2 standing")
     yield view.save(tmp_path / "picture.html")
@@ -39,7 +32,7 @@ def test_a_picture_is_dark_where_the_words_around_it_are_light(page, saved):
     inner.wait_for_function(DRAWN)
     assert not inner.evaluate(DARK)
 
-    def colours() -> list[str]:
+    def colours():
         paths = ("meshcat/measured/FL_foot", "meshcat/ground")
         return [inner.evaluate(COLOUR, path) for path in paths]
 

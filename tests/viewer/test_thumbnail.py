@@ -1,7 +1,5 @@
 """The image of a picture in a notebook: drawn without a browser, it shows the same as the page."""
 
-from __future__ import annotations
-
 import base64
 import io
 from contextlib import closing
@@ -23,21 +21,19 @@ from .looks import hue_pixels
 KB = 1000
 
 
-def image(viewer: Viewer) -> np.ndarray:
+def image(viewer):
     """The image of a display, (height, width, 3)."""
     data, _ = viewer._repr_mimebundle_()
     opened = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
     return np.asarray(opened.convert("RGB")).astype(int)
 
 
-def differing(one: np.ndarray, other: np.ndarray) -> int:
+def differing(one, other):
     """How many pixels differ to the eye."""
     return int((np.abs(one - other).max(axis=2) > 24).sum())
 
 
-def test_the_image_shows_robot_forces_cones_centre_of_mass_and_legend(
-    viewer, standing, contacts, forces
-):
+def test_the_image_shows_all_of_the_scene_and_a_legend(viewer, standing, contacts, forces):
     empty = image(viewer)
     robot = image(viewer.show(standing, com=False))
     assert differing(empty, robot) > 0.05 * robot[..., 0].size

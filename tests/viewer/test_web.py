@@ -1,7 +1,5 @@
 """The built JavaScript matches its sources."""
 
-from __future__ import annotations
-
 import hashlib
 
 from floatbase.viewer.web import pages

@@ -1,7 +1,5 @@
 """The window: life cycle, threads, interrupts, slow pages, foreign connections."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os
@@ -12,11 +10,9 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
 
 import msgpack
 import numpy as np
@@ -35,11 +31,11 @@ UPDATES = [protocol.set_transform(f"/meshcat/{i}", np.eye(4)) for i in range(100
 BALL = partial(protocol.set_object, packed=threejs.mesh(*geometry.sphere(0.1)).packed)
 
 
-def window_threads() -> list[threading.Thread]:
+def window_threads():
     return [each for each in threading.enumerate() if each.name.startswith("floatbase-window")]
 
 
-def commands_in(frame: bytes) -> list[dict]:
+def commands_in(frame):
     """The commands of a frame."""
     commands, at = [], 0
     while at < len(frame):
@@ -49,7 +45,7 @@ def commands_in(frame: bytes) -> list[dict]:
     return commands
 
 
-def in_a_loop(coroutine: Coroutine[Any, Any, Any]) -> Any:
+def in_a_loop(coroutine):
     """The result of a coroutine, run in a thread of its own."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, coroutine).result()
@@ -106,13 +102,10 @@ def test_the_window_listens_on_loopback_only(window):
     socket.create_connection(("127.0.0.1", window.port), timeout=2).close()
 
 
-def listening() -> set[int]:
+def listening():
     """The ports that this process listens on."""
-    return {
-        found.laddr.port
-        for found in psutil.Process().net_connections("inet")
-        if found.status == psutil.CONN_LISTEN
-    }
+    found = psutil.Process().net_connections("inet")
+    return {one.laddr.port for one in found if one.status == psutil.CONN_LISTEN}
 
 
 def test_a_picture_has_a_port_only_after_its_address_is_read(viewer, standing, tmp_path):
@@ -242,7 +235,7 @@ def test_deletes_and_objects_keep_their_order_on_the_way_to_a_busy_page(window):
 
 
 def test_threads_draw_at_the_same_time(window):
-    def draw(name: int) -> None:
+    def draw(name):
         for i in range(500):
             window.put([protocol.set_transform(f"/meshcat/{name}", np.eye(4) * i)])
 
@@ -253,21 +246,19 @@ def test_threads_draw_at_the_same_time(window):
 
 
 @contextmanager
-def interrupting() -> Iterator[Callable[[Callable[[], object], float], bool]]:
+def interrupting():
     """Yield a function that repeats another until an interrupt, and tells whether there was one.
 
     The interrupt comes after a given processor time of this process [s], because pytest-timeout
     uses the timer of the wall clock. Python drops an interrupt that occurs in a destructor.
     """
 
-    def repeat(
-        use: Callable[[], object],
-    ) -> None:  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
+    def repeat(use):  # not in the `try`: where a loop jumps back, Python 3.13 leaves it uncaught
         stop = time.monotonic() + 1.0
         while time.monotonic() < stop:
             use()
 
-    def interrupted(use: Callable[[], object], delay: float) -> bool:
+    def interrupted(use, delay):
         try:
             signal.setitimer(signal.ITIMER_VIRTUAL, delay)
             repeat(use)
@@ -316,7 +307,7 @@ def test_interrupts_in_a_drawing_loop_leave_the_window_usable(window):
     until(lambda: window.n_pages == 1)
     drawn = count = 0
 
-    def draw() -> None:
+    def draw():
         nonlocal drawn
         drawn += 1
         window.put([protocol.set_transform("/meshcat/a", np.eye(4) * drawn)])
@@ -352,7 +343,7 @@ STRANGE = [
 def test_unknown_messages_of_a_page_are_ignored(window, caplog):
     heard = []
 
-    def hear(name: str, value: Any) -> None:
+    def hear(name, value):
         heard.append((name, value))
         if name == "broken":
             raise ZeroDivisionError("of the callback")
