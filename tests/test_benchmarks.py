@@ -76,13 +76,9 @@ def test_a_process_that_ends_says_why(tmp_path):
 @pytest.mark.parametrize("name", soak.SOAKS)
 def test_a_short_soak_holds(name, monkeypatch):
     monkeypatch.setattr(soak, "SAMPLES", 2)
-    # so few times show no leak, only what is loaded late
-    monkeypatch.setitem(soak.LIMITS, "memory, MB", 200.0)
-    # few pictures on a busy machine: only one that waits for a page is told
-    monkeypatch.setattr(soak, "SLOWED", 100.0)
-    monkeypatch.setattr(soak, "PACE", 0.0)  # nor does a busy machine keep real time
-    row = soak.run(name, 3)
-    assert (row.name, row.times, row.broken) == (name, 3, "")
+    monkeypatch.setattr(soak, "PACE", 0.0)  # a busy machine does not keep real time
+    monkeypatch.setitem(soak.LIMITS, "memory, MB", 200.0)  # some modules are loaded late
+    assert soak.run(name, 3).broken == ""
 
 
 @pytest.mark.front_end
@@ -108,8 +104,7 @@ def test_a_soak_reports_what_grows_and_what_breaks(monkeypatch):
     monkeypatch.setattr(soak, "SOAKS", {"leaking": (leaking, 20), "breaks": (breaks, 20)})
     found = soak.run("leaking", 20).broken
     kept.clear()
-    assert "memory, MB: +" in found.broken and "descriptors: +" in found.broken
-    assert "threads" not in found.broken
+    assert "memory, MB: +" in found and "descriptors: +" in found and "threads" not in found
     assert soak.run("breaks", 20).broken == "it broke"
 
 
