@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 # multiples of the piece of work; a run of all tests fails above one and a half times its budget
-BUDGETS = {"make test": 4000.0, "only in make test-all": 4000.0}
+BUDGETS = {"make test": 2700.0, "only in make test-all": 2700.0}
 TOLERANCE = 1.5
 FILES = 25  # in the table
 KEY = "processor seconds"
