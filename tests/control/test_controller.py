@@ -36,13 +36,13 @@ def test_daqp_finds_the_optimum_that_cvxpy_finds(name):
         prices = np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers))
         r, gap = judge.residuals, abs(found.objective - judge.objective)
         worth = max(r.inequality, r.equality) * prices + r.complementarity * len(qp.G)
-        assert gap < 1e-9 * (1.0 + abs(judge.objective)) + 2.0 * worth
+        # Clarabel's gap is relative to the objective
+        assert gap < 1e-8 * (1.0 + abs(judge.objective)) + 2.0 * worth
         n_active += bool(found.active)
         for solution in (found, judge):
             r = solution.residuals
             assert r.equality < 1e-9 and r.dual == 0.0
             assert max(r.inequality, r.stationarity) < 1e-6
-            # Clarabel's gap is relative to the objective
             gap = 1e-8 * abs(judge.objective) if solution is judge else 0.0
             assert r.complementarity < max(1e-6, gap)
     # with no row active, these states would try nothing
