@@ -225,7 +225,7 @@ def _plot_both(
 
 
 def _finished(axis: Axes, rollout: Rollout, label: str) -> Axes:
-    """Add labels, a legend, and a band for each push."""
+    """Add labels, a legend if a curve has a label, and a band for each push."""
     for i, push in enumerate(rollout.pushes):
         end, label_of_push = push.start + push.duration, "" if i else "push"
         axis.axvspan(push.start, end, color=PUSH, alpha=0.12, label=label_of_push)
