@@ -13,37 +13,28 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check
+# uv downloads and installs; where it is missing, pip installs it into .venv first
+UV := $(shell command -v uv)
+INSTALL = VIRTUAL_ENV="$(CURDIR)/$(VENV)" $(if $(UV),"$(UV)",$(BIN)/uv) pip install
 
-# Prints the key of .venv (Python version and folder), then the Python that creates it.
-# An unsuitable Python, or one without venv, prints nothing.
-PROBE := import ensurepip, sys, venv, zlib; \
-	(3, 11) <= sys.version_info < (3, 14) or sys.exit(1); \
+# Prints the key of .venv (Python version and folder), then the Python that creates it. A Python that is too old or too new prints
+# nothing, and neither does one without venv, unless uv creates .venv.
+PROBE := import sys, zlib$(if $(UV),,, ensurepip, venv); \
+	(3, 11) <= sys.version_info < (3, 15) or sys.exit(1); \
 	print("%d.%d-%x" % (*sys.version_info[:2], zlib.crc32(sys.argv[1].encode())), sys._base_executable)
-FOUND := $(shell for p in $(or $(PYTHON),$(BIN)/python python3 python3.13 python3.12 python3.11); do \
-	"$$p" -c '$(PROBE)' "$(CURDIR)" 2>/dev/null && break; done)
+first_suitable = $(shell for p in $(1); do "$$p" -c '$(PROBE)' "$(CURDIR)" 2>/dev/null && break; done)
+FOUND := $(call first_suitable,$(or $(PYTHON),$(BIN)/python python3 python3.14 python3.13 python3.12 python3.11))
+# where there is none, uv downloads one
+ifeq ($(FOUND)$(PYTHON),)
+ifneq ($(and $(UV),$(filter lab test test-all site setup lock live,$(MAKECMDGOALS))),)
+FOUND := $(call first_suitable,"$(shell "$(UV)" python install -q 3.13 >&2; "$(UV)" python find 3.13)")
+endif
+endif
 KEY := $(or $(firstword $(FOUND)),none)
 BASE := $(wordlist 2,99,$(FOUND))
 
-# the extension of JupyterLab that fetches news and updates; disabled in .venv
-NEWS := @jupyterlab/apputils-extension:announcements
-FIRST := /lab/tree/my/00_start_here.ipynb
-# JupyterLab's list of open tabs; kept with this copy of the course, so that tabs of another copy do not open here
-TABS := $(CURDIR)/$(VENV)/workspaces
-
 # two processes share the tests; the slowest tests run first (tests/conftest.py)
 WORKERS := -n 2 --dist worksteal
-
-# JupyterLab's autosave interval [s]; its default is two minutes
-SAVING := {"@jupyterlab/docmanager-extension:plugin": {"autosaveInterval": 30}}
-SETTINGS := $(VENV)/share/jupyter/lab/settings
-# the course needs no language servers, and the search for them prints a long list of those not installed
-QUIET := --LanguageServerManager.autodetect=False
-
-# shortens pip's output to a line for every twentieth package, and one before the unpacking
-PROGRESS := n=0; while read -r what which rest; do case "$$what $$which" in \
-	"Collecting "* | "Processing "*) n=$$((n + 1)); [ $$((n % 20)) != 0 ] || echo "  $$n packages found";; \
-	"Installing collected") echo "  unpacking: about a minute";; esac; done
 
 help:
 	@echo "make lab     open the course in JupyterLab"
@@ -58,11 +49,9 @@ help:
 	@echo
 	@echo "More: PYTHON=python3.12, LAB_ARGS=--no-browser, PYTEST_ARGS='-k friction', LOCK_ARGS=--upgrade"
 
-lab: setup
-	@$(BIN)/python -m floatbase.lessons.publish workspace
-	@mkdir -p $(SETTINGS) && echo '$(SAVING)' > $(SETTINGS)/overrides.json
-	$(BIN)/jupyter lab --ServerApp.root_dir=notebooks --LabApp.default_url=$(FIRST) --ServerApp.ip=127.0.0.1 \
-		--LabApp.workspaces_dir="$(TABS)" --LabApp.extension_manager=readonly $(QUIET) $(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
+# the controller compiles while JupyterLab opens
+lab: $(VENV)/installed-$(KEY)
+	@$(BIN)/floatbase lab notebooks/my $(LAB_ARGS)
 
 test: TIER := -m "not front_end"
 test test-all: $(VENV)/tests-$(KEY)
@@ -76,18 +65,24 @@ site: $(VENV)/tests-$(KEY)
 
 setup: $(VENV)/ready-$(KEY)
 
+# what is printed where an installation fails; the next try starts it again
+FAILED := { echo; echo "The set-up is not complete; the reason is above. The network and about 3 GB of free disk space are needed."; \
+	echo "Then run the same command again."; exit 1; } >&2
+
 # .venv is created again if the lock, the Python or the folder has changed, or if the last attempt was interrupted
 $(VENV)/locked-$(KEY): environment.txt | python
-	@echo "Creating $(VENV) with $(BASE): about 2 GB, a few minutes the first time."
+	@echo "Creating $(VENV) with $(BASE): it downloads about 600 MB, which takes a minute or two, and needs 2 GB."
 	@rm -rf $(VENV)
-	@"$(BASE)" -m venv $(VENV)
-	@$(PIP) install -q -c environment.txt hatchling editables
-	@{ PYTHONUNBUFFERED=1 $(PIP) install --progress-bar=off -c environment.txt --no-build-isolation -e ".[course]" && \
-		$(BIN)/jupyter labextension disable $(NEWS) >/dev/null 2>&1 && touch $@; } | { $(PROGRESS); }
-	@test -e $@  # the pipe above hides a failure of pip
+	@$(if $(UV),"$(UV)" venv -q --seed --python "$(BASE)" $(VENV),"$(BASE)" -m venv $(VENV) && \
+		$(BIN)/python -m pip --disable-pip-version-check install -q -c environment.txt uv) || $(FAILED)
+	@{ $(INSTALL) -q -c environment.txt hatchling editables && \
+		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course]" && touch $@; } 2>&1 | grep -v "^ + "; test -e $@ || $(FAILED)
 
-$(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
-	@$(PIP) install -q --no-deps --no-build-isolation -e .
+$(VENV)/installed-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
+	@$(INSTALL) -q --no-deps --no-build-isolation -e . || $(FAILED)
+	@touch $@
+
+$(VENV)/ready-$(KEY): $(VENV)/installed-$(KEY)
 	@echo "Compiling the controller (once, about a minute)."
 	@$(BIN)/python -m floatbase compile >/dev/null 2>&1 || $(BIN)/python -m floatbase compile
 	@touch $@
@@ -95,14 +90,16 @@ $(VENV)/ready-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 # packages that only the tests and the site need
 $(VENV)/tests-$(KEY): $(VENV)/ready-$(KEY)
 	@echo "Installing the packages that only the tests and the site need."
-	@$(PIP) install -q -r environment.txt
+	@$(INSTALL) -q -r environment.txt || $(FAILED)
 	@touch $@
 
 python:
 	@if [ -z "$(FOUND)" ]; then \
-		echo "floatbase needs Python 3.11, 3.12 or 3.13 with the venv module. $(or $(PYTHON),python3) is not suitable."; \
-		echo "Install one (on Debian and Ubuntu: apt install python3 python3-venv), or name one:"; \
-		echo "    make $(or $(MAKECMDGOALS),lab) PYTHON=/path/to/python3.12"; \
+		echo "floatbase needs Python 3.11, 3.12, 3.13 or 3.14 with the venv module. $(or $(PYTHON),python3) is not suitable."; \
+		echo "Install uv, which brings a Python of its own, and run make again:"; \
+		echo "    curl -LsSf https://astral.sh/uv/install.sh | sh      (or: pipx install uv, brew install uv)"; \
+		echo "Or install a Python (on Debian and Ubuntu: apt install python3-venv), or name one:"; \
+		echo "    make $(or $(MAKECMDGOALS),lab) PYTHON=/path/to/python3.13"; \
 		exit 1; \
 	fi >&2
 

@@ -83,7 +83,7 @@ EXTRAS = {
 TOOLS = {
     "build", "editables", "example-robot-data-loaders", "hatchling", "jupyterhub", "jupyterlab",
     "mypy", "myst-nb", "nbval", "pycollada", "pytest-timeout", "pytest-xdist", "ruff",
-    "sphinx-book-theme", "sphinx-design", "voila",
+    "sphinx-book-theme", "sphinx-design", "uv", "voila",
 }  # fmt: skip
 # benchmarks/peers.py makes environments of their own for these
 PEERS = {"placo", "tsid"}
@@ -335,7 +335,7 @@ def _numbers(ranges: str) -> set[str]:
 
 # largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
 BUDGETS = {
-    "library": 14480, "lessons": 12700, "viewer": 4100, "tests": 22000, "benchmarks": 2300,
+    "library": 14620, "lessons": 12700, "viewer": 4100, "tests": 22000, "benchmarks": 2300,
     "docstrings": 16000,
 }  # fmt: skip
 

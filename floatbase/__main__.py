@@ -1,4 +1,4 @@
-"""The command line: `python -m floatbase robots`, `view`, `recall` and `compile`."""
+"""The command line: `floatbase`, or `python -m floatbase`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import threading
 import webbrowser
 from collections.abc import Sequence
 from contextlib import closing
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import floatbase as fb
@@ -17,6 +18,14 @@ import floatbase as fb
 if TYPE_CHECKING:
     from floatbase.playground import Playground
 
+# of `python -m floatbase.lessons.publish`, which describes their options
+COURSE_COMMANDS = {
+    "site": "build the course as a web site",
+    "grade": "grade the files that learners handed in",
+    "assign": "write a package with some lessons for students",
+    "solutions": "write the lessons with solutions, for teachers",
+    "lecture": "write the questions for the lecture as slides",
+}
 _POLL_INTERVAL = 0.05  # s between checks for a connected page: short enough for a reader
 
 
@@ -63,18 +72,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "compile", help="compile the controller in advance, so that the first one starts quickly"
     )
     commands.add_parser("recall", help="ask questions of lessons that you have worked through")
-    options = parser.parse_args(arguments)
+    lab = commands.add_parser("lab", help="open the course in JupyterLab")
+    lab.add_argument(
+        "folder",
+        nargs="?",
+        type=Path,
+        default=Path(),
+        help="your copy of the lessons (default: this folder)",
+    )
+    lab.epilog = "All further options go to JupyterLab, such as --no-browser or --port=9000."
+    commands.add_parser("doctor", help="show what is installed, what is missing, and how to get it")
+    for name, text in COURSE_COMMANDS.items():
+        commands.add_parser(name, help=text, add_help=False)
+    options, further = parser.parse_known_args(arguments)
+    if options.command in COURSE_COMMANDS:
+        from floatbase.lessons.publish.__main__ import main as run_course_command
+
+        run_course_command([options.command, *further])
+        return 0
+    if further and options.command != "lab":
+        parser.error(f"unrecognized arguments: {' '.join(further)}")
+    try:
+        return _run(options, further, sys.argv[1:] if arguments is None else arguments)
+    except fb.FloatbaseError as error:
+        print(f"floatbase: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[str]) -> int:
+    """Run a command; `further` are options for JupyterLab, `given` all arguments."""
     if options.command == "robots":
         print("\n".join(f"{name:14} {text}" for name, text in fb.catalogue().items()))
         return 0
     if options.command == "compile":
         from floatbase.behaviours import Gait, Walk  # not needed by the other commands
+        from floatbase.control.tick import compiling_ahead
 
         go2 = fb.load("go2")
-        controller = fb.WholeBodyController(
-            go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
-        )
-        Walk(go2, fb.Contacts.points(go2), Gait.trot(go2))  # compiles its targets
+        with compiling_ahead():
+            controller = fb.WholeBodyController(
+                go2, fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
+            )
+            Walk(go2, fb.Contacts.points(go2), Gait.trot(go2))  # compiles its targets
         print(f"The controller uses its {controller.backend} backend: {controller.backend_reason}.")
         return 0
     if options.command == "recall":
@@ -82,11 +121,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         ask()
         return 0
-    try:
-        return _run_viewer(options, sys.argv[1:] if arguments is None else arguments)
-    except fb.FloatbaseError as error:
-        print(f"floatbase: {error}", file=sys.stderr)
-        return 2
+    if options.command == "lab":
+        from floatbase.lessons.lab import open_lab
+
+        open_lab(options.folder, further)
+    if options.command == "doctor":
+        from floatbase.doctor import report
+
+        print(report())
+        return 0
+    return _run_viewer(options, given)
 
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:

@@ -32,7 +32,7 @@ LAYERS = """
     live
     playground
     lessons
-    __main__
+    doctor __main__
 """
 LAYER_OF = {name: layer for layer, line in enumerate(LAYERS.split("\n")) for name in line.split()}
 MAX_LINES = 400  # of a module, without docstrings

@@ -4,6 +4,7 @@ from floatbase.control.tick.compiled import (
     CompiledTick,
     announce_if_slow,
     cache_warning,
+    compiling_ahead,
     unsupported_reason,
 )
 from floatbase.control.tick.targets import TargetLayout
@@ -15,5 +16,6 @@ __all__ = [
     "TickInputs",
     "announce_if_slow",
     "cache_warning",
+    "compiling_ahead",
     "unsupported_reason",
 ]

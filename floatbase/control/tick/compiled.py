@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from threading import Event, Thread
 
@@ -56,6 +56,17 @@ def announce_if_slow(
         yield
     finally:
         ended.set()
+
+
+@contextmanager
+def compiling_ahead() -> Iterator[None]:
+    """Make other processes wait for the code that this one compiles, instead of compiling too."""
+    with ExitStack() as stack:
+        with suppress(ImportError, OSError, AttributeError):  # `unsupported_reason` will name it
+            from floatbase.control.tick import jit, tick
+
+            stack.enter_context(jit.compile_lock(tick.tick, ahead=True))
+        yield
 
 
 def cache_warning() -> str:
@@ -184,10 +195,11 @@ class CompiledTick:
         n_compiled = self._compilation_count()
         with announce_if_slow(
             f"floatbase is compiling its controller{duration}.",
-            lambda: self._compilation_count() > n_compiled,
+            lambda: jit.waiting or self._compilation_count() > n_compiled,
         ):
             try:
-                self._tick_standing()
+                with jit.compile_lock(self._tick):
+                    self._tick_standing()
             except Exception as cache_failure:  # damaged files may raise anything
                 try:
                     self._tick = tick.tick = jit.without_cache(self._tick)

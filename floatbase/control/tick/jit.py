@@ -10,14 +10,19 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numba
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 from floatbase.control.problem import INCONSISTENCY_TOLERANCE
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
@@ -38,6 +43,10 @@ jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS
 # small and called often
 jit_forceinline: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTIONS)
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
+
+_LOCK_FILE = "compiling.lock"  # beside the compiled code
+_compiles_ahead = False  # whether this process holds the lock alone
+waiting = False  # whether this process waits for another one that compiles ahead
 
 jit_enabled = hasattr(jit(lambda: None), "py_func")  # False if NUMBA_DISABLE_JIT is set
 cache_error = ""  # why compiled code cannot be kept on disk
@@ -75,6 +84,27 @@ def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
         with suppress(OSError):  # a full disk: numba compiles again
             _copy_installed_code(Path(function.__code__.co_filename), Path(cached.stats.cache_path))
     return cached
+
+
+@contextmanager
+def compile_lock(function: Any, *, ahead: bool = False) -> Iterator[None]:
+    """Let `floatbase compile` (`ahead`) work alone; other processes wait, then load its code."""
+    global _compiles_ahead, waiting
+    folder = getattr(getattr(function, "stats", None), "cache_path", None)
+    if fcntl is None or folder is None or _compiles_ahead:
+        yield
+        return
+    with ExitStack() as stack:
+        with suppress(OSError):  # without a lock, both compile
+            os.makedirs(folder, exist_ok=True)
+            file = stack.enter_context(open(Path(folder) / _LOCK_FILE, "a"))
+            waiting = True
+            fcntl.flock(file, fcntl.LOCK_EX if ahead else fcntl.LOCK_SH)
+        waiting, _compiles_ahead = False, ahead
+        try:
+            yield
+        finally:
+            _compiles_ahead = False
 
 
 def _copy_installed_code(source: Path, cache: Path) -> None:

@@ -15,7 +15,9 @@ from typing import Any
 from floatbase._files import write_whole
 from floatbase.errors import InputError
 
-NOTEBOOKS = Path(__file__).parents[3] / "notebooks"  # of the course
+_INSTALLED = Path(__file__).parents[2] / "_notebooks"
+# of the course: inside an installed package, or else at the top of the repository
+NOTEBOOKS = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3] / "notebooks"
 MY_FOLDER = "my"
 _RECORD_FILE = ".from.json"  # file name -> digest of the text that the learner received last
 # exceptions that such JSON raises

@@ -67,6 +67,11 @@ def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
     return width, height
 
 
+def browser_path() -> str | None:
+    """Return the path of the browser that makes films, or None."""
+    return next(filter(None, map(shutil.which, _BROWSERS)), None)
+
+
 def capture(page: str, target: Path, size: tuple[int, int]) -> None:
     """Write the recording in a page as .mp4 or .gif, or its first picture as .png."""
     # the new file is created first, so that `OSError` is raised now instead of after the work;
@@ -96,7 +101,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
         raise ViewerError(
             f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
-    path = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    path = browser_path()
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
         file = Path(folder, "scene.html")
         file.write_text(page, encoding="utf-8")

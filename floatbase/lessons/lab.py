@@ -1,0 +1,56 @@
+"""`floatbase lab`: the learner's copy of the course in JupyterLab."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from floatbase.errors import FloatbaseError
+from floatbase.lessons.publish.workspace import prepare_workspace
+
+FIRST = "00_start_here.ipynb"
+# JupyterLab saves twice a minute, and does not look for news and updates
+_SETTINGS = Path(__file__).parent / "jupyter"
+_TABS = ".open_tabs"  # kept with the copy, so that tabs of another copy do not open
+
+
+def open_lab(folder: Path, arguments: Sequence[str] = ()) -> None:
+    """Update the lessons in a folder, and become JupyterLab there.
+
+    Meanwhile the controller compiles, if it is not compiled; the first cell that needs it waits.
+    """
+    if find_spec("jupyterlab") is None:
+        raise FloatbaseError(
+            'JupyterLab is not installed. Install the course with pip install "floatbase[course]".'
+        )
+    for line in prepare_workspace(mine=folder):
+        print(line)
+    sys.stdout.flush()
+    subprocess.Popen(
+        [sys.executable, "-m", "floatbase", "compile"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    folders = [str(_SETTINGS), *filter(None, [os.environ.get("JUPYTER_CONFIG_PATH")])]
+    os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(folders)
+    os.execv(sys.executable, [sys.executable, "-m", "jupyterlab", *_options(folder), *arguments])
+
+
+def _options(folder: Path) -> list[str]:
+    """Return the options of JupyterLab."""
+    root = folder.resolve()
+    options = [
+        f"--ServerApp.root_dir={root}",
+        "--ServerApp.ip=127.0.0.1",
+        f"--LabApp.default_url=/lab/tree/{FIRST}",
+        f"--LabApp.workspaces_dir={root / _TABS}",
+        "--LabApp.extension_manager=readonly",
+        # the course needs no language servers, and the search prints those that are not installed
+        "--LanguageServerManager.autodetect=False",
+    ]
+    is_root = hasattr(os, "geteuid") and os.geteuid() == 0
+    return [*options, "--allow-root"] if is_root else options
