@@ -117,8 +117,8 @@ def _parked(record: Rollout) -> Verdict:
     missed, speed = np.linalg.norm(error), np.linalg.norm(record.final.com_velocity)
     left = f"{1000 * missed:.1f} mm from the target, with {1000 * speed:.0f} mm/s"
     return first_fault([
-        ("falls", record.outcome != "completed", f"go2 falls after {record.time[-1]:.2f} s. Which "
-         "sign pulls it back to the target, and which sign slows it down?"),
+        ("falls", record.outcome != "completed", "go2 falls. Which sign pulls it back "
+         "to the target, and which sign slows it down?"),
         ("swings", speed > AT_REST, f"The centre of mass does not come to rest: it is {left}. Add "
          "a damper, a term with the velocity."),
         ("stays", abs(missed - np.linalg.norm(TARGET)) < ARRIVED, "The centre of mass stays where "
