@@ -96,9 +96,9 @@ $(VENV)/tests-$(KEY): $(VENV)/ready-$(KEY)
 python:
 	@if [ -z "$(FOUND)" ]; then \
 		echo "floatbase needs Python 3.11, 3.12, 3.13 or 3.14 with the venv module. $(or $(PYTHON),python3) is not suitable."; \
-		$(if $(UV),echo "uv did not bring one; the reason is above.";,\
+		$(if $(PYTHON),,$(if $(UV),echo "uv did not bring one; the reason is above.";,\
 			echo "Install uv, which brings a Python of its own, and run make again:"; \
-			echo "    curl -LsSf https://astral.sh/uv/install.sh | sh      (or: pipx install uv, brew install uv)";) \
+			echo "    curl -LsSf https://astral.sh/uv/install.sh | sh      (or: pipx install uv, brew install uv)";)) \
 		echo "You can also install a Python (on Debian and Ubuntu: apt install python3-venv), or name one:"; \
 		echo "    make $(or $(MAKECMDGOALS),lab) PYTHON=/path/to/python3.13"; \
 		exit 1; \
