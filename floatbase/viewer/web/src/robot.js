@@ -8,7 +8,8 @@
 import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
-import {choiceRule, numberRule, rangeOf, refusalText, rows} from "./engine/settings.js";
+import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
+import {readAddress} from "./live/attributes.js";
 import {controlsOf} from "./live/controls.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
@@ -48,22 +49,6 @@ export function open(config) {
       isSeen = now;
       changed(now);
     }));
-}
-
-// The values of an address, ?key=value&…. read(key, rule, parse) returns one that follows its rule.
-// Another one is undefined, and `refused` has a sentence about it.
-function readAddress(search) {
-  const texts = new URLSearchParams(search), refused = [];
-  return {
-    texts, refused,
-    read(key, rule, parse = (text) => text) {
-      const text = texts.get(key);
-      if (!text) return undefined;
-      if (rule.fits(parse(text))) return parse(text);
-      refused.push(`${refusalText(key, text, rule.words)} It counts as not given.`);
-      return undefined;
-    },
-  };
 }
 
 async function start(scene, worker, {config, given, name, sight}) {

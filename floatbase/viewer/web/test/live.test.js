@@ -2,7 +2,11 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
-import {checkPush, checkSettings, defaults, rangeOf, rows} from "../src/engine/settings.js";
+import {
+  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows,
+} from "../src/engine/settings.js";
+import {numberOf} from "../src/controls.js";
+import {readAddress} from "../src/live/attributes.js";
 import {setParameter} from "../src/engine/tick.js";
 import {controlsOf, labelOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
@@ -194,7 +198,27 @@ test("the largest push of the slider is the largest push", () => {
   const {high} = rangeOf("push", go2), push = {duration: 0.1, start: 0, at: [0, 0, 0], body: 1};
   assert.equal(high, 375);
   checkPush({...push, force: [0, -high, 0]}, go2);
-  assert.throws(() => checkPush({...push, force: [1, high, 0]}, go2), /length of at most 375/);
+  assert.throws(() => checkPush({...push, force: [1, high, 0]}, go2), /of at most 375/);
+});
+
+test("attributes that make no sense are refused in words and count as not given", () => {
+  const gaits = choiceRule(["trot", "walk"]), friction = numberRule(0.05, 1.5);
+  const sensible = readAddress("?gait=trot&mu=0.6&push=");
+  assert.equal(sensible.read("gait", gaits), "trot");
+  assert.equal(sensible.read("mu", friction, numberOf), 0.6);
+  assert.equal(sensible.read("push", friction, numberOf), undefined); // empty
+  assert.equal(sensible.read("panel", gaits), undefined); // not given
+  assert.deepEqual(sensible.refused, []);
+  for (const gait of ["constructor", "__proto__", "toString", "Trot", "trot ", "hop", "0"]) {
+    const odd = readAddress(new URLSearchParams({gait}));
+    assert.equal(odd.read("gait", gaits), undefined);
+    assert.match(odd.refused[0], /^gait must be one of trot, walk, not "/);
+  }
+  for (const mu of ["Infinity", "NaN", "1e308", "-0.5", "0", "0x1", "0,6", "0.6 N", "−1", "∞"]) {
+    const odd = readAddress(new URLSearchParams({mu}));
+    assert.equal(odd.read("mu", friction, numberOf), undefined);
+    assert.match(odd.refused[0], /^mu must be a number from 0.05 to 1.5, not "/);
+  }
 });
 
 test("a robot without gaits cannot walk", () => {

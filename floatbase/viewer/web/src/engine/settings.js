@@ -38,12 +38,12 @@ export const numberRule = (low, high) => ({
   fits: (value) => typeof value === "number" && value >= low && value <= high,
 });
 export const choiceRule = (values) => ({
-  words: values.length ? `one of ${values.join(", ")}` : "left out for this robot",
+  words: values.length ? `one of ${values.map(String).join(", ")}` : "left out for this robot",
   fits: (value) => values.includes(value),
 });
 const SWITCH = {words: "true or false", fits: (value) => typeof value === "boolean"};
 const vectorRule = (most) => ({
-  words: "a list of three numbers" + (most < Infinity ? ` with a length of at most ${most}` : ""),
+  words: `a vector of three numbers${most < Infinity ? `, of at most ${most}` : ""}`,
   fits: (value) => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)
     && Math.hypot(...value) <= most,
 });
@@ -54,17 +54,21 @@ export function check(name, value, {words, fits}) {
 }
 export const refusalText = (name, value, words) => `${name} must be ${words}, not ${shown(value)}.`;
 
-// Refuse what is no object with these names, each value as its rule says.
-function checkEach(given, rules, what) {
+// Refuse what is no object with some of these names.
+export function checkNames(given, names, what) {
   if (Object.prototype.toString.call(given) !== "[object Object]") {
     throw new Refusal(`A ${what} must be an object, not ${shown(given)}.`);
   }
-  for (const [name, value] of Object.entries(given)) {
-    if (!Object.hasOwn(rules, name)) {
-      throw new Refusal(`A ${what} has no ${shown(name)}, only ${Object.keys(rules).join(", ")}.`);
+  for (const name of Object.keys(given)) {
+    if (!names.includes(name)) {
+      throw new Refusal(`A ${what} has no ${shown(name)}, only ${names.join(", ")}.`);
     }
-    check(name, value, rules[name]);
   }
+}
+
+function checkEach(given, rules, what) {
+  checkNames(given, Object.keys(rules), what);
+  for (const [name, value] of Object.entries(given)) check(name, value, rules[name]);
 }
 
 function shown(value) {

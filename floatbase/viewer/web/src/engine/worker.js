@@ -9,7 +9,7 @@ import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
 import {pushRecovery} from "./recovery.js";
-import {Refusal, check, liftedFeet, numberRule} from "./settings.js";
+import {Refusal, check, checkNames, liftedFeet, numberRule} from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
@@ -157,10 +157,8 @@ const handlers = {
 
 onmessage = async ({data}) => {
   try {
-    for (const [key, value] of Object.entries(data ?? {})) {
-      if (!Object.hasOwn(handlers, key)) throw new Refusal(`There is no message "${key}".`);
-      await handlers[key](value);
-    }
+    checkNames(data, Object.keys(handlers), "message");
+    for (const [key, value] of Object.entries(data)) await handlers[key](value);
   } catch (error) {
     postMessage({
       error: String(error?.message ?? error), isRefusal: error instanceof Refusal,
