@@ -41,7 +41,7 @@ export const choiceRule = (values) => ({
   words: values.length ? `one of ${values.map(String).join(", ")}` : "left out for this robot",
   fits: (value) => values.includes(value),
 });
-const SWITCH = {words: "true or false", fits: (value) => typeof value === "boolean"};
+export const SWITCH = {words: "true or false", fits: (value) => typeof value === "boolean"};
 const vectorRule = (most) => ({
   words: `a vector of three numbers${most < Infinity ? `, of at most ${most}` : ""}`,
   fits: (value) => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)

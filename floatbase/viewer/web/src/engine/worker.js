@@ -9,7 +9,7 @@ import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
 import {pushRecovery} from "./recovery.js";
-import {Refusal, check, checkNames, liftedFeet, numberRule} from "./settings.js";
+import {Refusal, SWITCH, check, checkNames, liftedFeet, numberRule} from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
@@ -136,7 +136,10 @@ const handlers = {
     engine?.reset();
     slipTime = null;
   },
-  pause: (isPaused) => clock.pause(Boolean(isPaused)),
+  pause(isPaused) {
+    check("pause", isPaused, SWITCH);
+    clock.pause(isPaused);
+  },
   step: () => clock.single(),
   timeScale(scale) {
     check("timeScale", scale, TIME_SCALES);
