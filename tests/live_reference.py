@@ -23,7 +23,7 @@ PUSH_TIME = 0.2  # s, when a push begins
 # friction coefficient, fraction of the torque limits, facets: tight friction, motors so weak that
 # most problems are infeasible, and the page's defaults
 SETTINGS = ((0.7, 1.0, 4), (0.7, 1.0, 16), (0.12, 1.0, 4), (0.3, 0.6, 8), (0.5, 0.35, 4),
-            (0.05, 0.01, 4))  # fmt: skip
+            (0.05, 0.05, 4))  # fmt: skip
 # robot, settings of the page, force of the push on the base [N] and its duration [s]
 RUNS: tuple[tuple[str, dict[str, Any], tuple[float, float, float], float], ...] = (
     ("go2", {}, (0.0, 0.0, 0.0), 0.1),

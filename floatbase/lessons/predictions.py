@@ -5,6 +5,7 @@ Predictions are stored in the learner's progress file and never leave this machi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,8 @@ _RIGHT = "right"
 # margins of a right prediction: fraction of the result, and of the largest of several results
 _PART_OF_RESULT, _PART_OF_LARGEST = 0.1, 0.02
 _ROUNDING = 1e-6  # in the unit of the prediction
+_AS_ASCII = str.maketrans("−–\t\xa0", "--  ")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # of this process: units of the predictions, and predictions that could not be saved
 _units: dict[str, str] = {}
 _unsaved: dict[str, dict[str, Any]] = {}
@@ -281,6 +284,18 @@ def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
 def parse_answer(answer: Any, unit: str, choices: Sequence[str], count: int) -> Any:
     """Return the choice or the numbers that a learner's answer means; see `predict`."""
     return _match_choice(answer, choices) if choices else _parse_numbers(answer, unit, count)
+
+
+def typed_numbers(line: str) -> list[float] | str:
+    """Return the numbers in a line such as "12.5", "3, 4" or "[3 4]". Another line stays text.
+
+    The pages of the site read numbers by the same rule, `numbersIn` in due.js.
+    """
+    text = line.translate(_AS_ASCII).strip(" ")
+    if text[:1] + text[-1:] in ("[]", "()"):
+        text = text[1:-1].strip(" ")
+    parts = re.split(" *[,;] *| +", text)
+    return [float(part) for part in parts] if all(map(_NUMBER.fullmatch, parts)) else line
 
 
 def _match_choice(answer: Any, choices: Sequence[str]) -> str:

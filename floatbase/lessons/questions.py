@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any
 
 from floatbase.errors import InputError
+from floatbase.lessons.progress import is_answer
 from floatbase.lessons.publish.workspace import lesson_notebooks
 
 # what the metadata "question" of a prediction's cell may contain, for use outside the lesson
@@ -43,6 +44,12 @@ class Question:
             return " / ".join(self.choices)
         many = "a number" if self.count == 1 else f"{self.count} numbers"
         return many + (f", in {self.unit}" if self.unit else "")
+
+    def fits(self, result: Any) -> bool:
+        """Return whether a result is one of the choices, or has the right count of numbers."""
+        if self.choices or not is_answer(result) or isinstance(result, str):
+            return result in self.choices
+        return len(result if isinstance(result, list) else [result]) == self.count
 
 
 @cache

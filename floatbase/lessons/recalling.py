@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import ast
 import re
 import textwrap
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 from floatbase._validation import short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.predictions import format_result, is_right, parse_answer
+from floatbase.lessons.predictions import format_result, is_right, parse_answer, typed_numbers
 from floatbase.lessons.questions import Question, all_questions
 
 PER_DAY = 3  # questions at a time
 FIRST_PAUSE, GROWTH = timedelta(days=2), 2  # after a right answer, and how the pause grows
+LONGEST_PAUSE = timedelta(days=365)
 MISSED_PAUSE = timedelta(days=1)  # after a wrong answer
 SURE_AND_MISSED_PAUSE = timedelta(hours=12)
 OLD = timedelta(days=30)  # age of an answer without a time
+# times as `recall` and the pages write them; the pages use the same expression
+TIME = (
+    r"(?!0000)(\d{4}-\d\d-\d\dT(?:[01]\d|2[0-3]):\d\d:\d\d)(?:\.\d{1,6})?"
+    r"(?:Z|[+-](?:[01]\d|2[0-3]):[0-5]\d)"
+)
 
 # a word without digits and indices; a single letter other than a is a symbol
 _FIRST_WORD = re.compile(r"\**([a-z]{2,}|a)(?=[\s,.:;'-])")
@@ -34,8 +39,9 @@ def recall(name: str = "", *answer: Any) -> None:
     """Ask three questions from earlier lessons again, or answer one of them.
 
     Only questions whose results you have seen are asked. A question that you missed comes back
-    after a day. One that you knew comes back after 2, 4, 8, … days. Questions that are asked
-    together are from different lessons, if there are enough.
+    after a day. One that you knew comes back after 2, 4, 8, … days, at most a year. An answer to a
+    question that is not due yet does not change its pause. Questions that are asked together are
+    from different lessons, if there are enough.
 
     Parameters
     ----------
@@ -74,6 +80,10 @@ def recall(name: str = "", *answer: Any) -> None:
     print(f"{name}: {'right' if right else 'not yet'}, {format_result(result, question.unit)}.")
     if not right:
         print(f"Look it up in lesson {question.lesson}, {question.topic}.")
+    now = datetime.now().astimezone()
+    last, pause = _last_answer(progress.history()[name], question, result, now)
+    if now - last < pause:
+        print("The question was not due yet, so this answer does not change when it comes back.")
     progress.append(name, {"recalled": said, "knew": right, "time": progress.now()})
 
 
@@ -83,10 +93,7 @@ def due_questions(now: datetime | None = None) -> list[Question]:
     history = progress.history()
     overdue = {}
     for name, (question, result) in _settled().items():
-        pause, last = MISSED_PAUSE, now - OLD
-        for event in _in_order(history.get(name, [])):
-            pause = _next_pause(event, pause, question, result)
-            last = _time_of(event) or last
+        last, pause = _last_answer(history[name], question, result, now)
         if now - last >= pause:
             overdue[name] = (now - last) / pause
     ordered = sorted(overdue, key=lambda name: (-overdue[name], name))
@@ -96,44 +103,72 @@ def due_questions(now: datetime | None = None) -> list[Question]:
     return [*mixed, *(question for question in questions if question not in first)][:PER_DAY]
 
 
-def _in_order(events: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Sort events by time. Imported answers may be later in the file than in time."""
-    timed, last = [], datetime.fromtimestamp(0, UTC)
-    for event in events:
-        last = _time_of(event) or last
-        timed.append((last, event))
-    return [event for _, event in sorted(timed, key=lambda pair: pair[0])]
+def _last_answer(
+    events: list[dict[str, Any]], question: Question, result: Any, now: datetime
+) -> tuple[datetime, timedelta]:
+    """Return when the last answer that counts was given, and how long the question then rests.
+
+    Until the result is shown, the last prediction counts. After that, only an answer to a question
+    that is due counts.
+    """
+    last, pause, is_shown = None, MISSED_PAUSE, False
+    for time, event in _in_order(events, now):
+        knew = None
+        if progress.is_answer(event.get("recalled")):
+            knew, is_shown = event.get("knew") is True, True
+        elif progress.is_answer(event.get("said")):
+            knew = is_right(event["said"], result, question.unit)
+        if knew is not None and (last is None or not is_shown or time - last >= pause):
+            pause = _next_pause(knew, event, pause if is_shown else MISSED_PAUSE)
+            last = time
+        is_shown = is_shown or progress.is_answer(event.get("is"))
+    return last or now - OLD, pause
 
 
-def _next_pause(
-    event: dict[str, Any], pause: timedelta, question: Question, result: Any
-) -> timedelta:
+def _next_pause(knew: bool, event: dict[str, Any], pause: timedelta) -> timedelta:
     """Return how long a question rests after an answer, from the pause before it."""
-    if "recalled" in event:
-        knew = event.get("knew") is True
-    elif "said" in event:
-        knew = is_right(event["said"], result, question.unit)
-    else:
-        return pause
     if knew:
-        return max(FIRST_PAUSE, GROWTH * pause)
-    return SURE_AND_MISSED_PAUSE if event.get("sure") else MISSED_PAUSE
+        return min(LONGEST_PAUSE, max(FIRST_PAUSE, GROWTH * pause))
+    return SURE_AND_MISSED_PAUSE if event.get("sure") is True else MISSED_PAUSE
+
+
+def _in_order(events: list[dict[str, Any]], now: datetime) -> list[tuple[datetime, dict[str, Any]]]:
+    """Sort events by time. Imported answers may be later in the file than in time.
+
+    An event without a time has the time of the event before it. An event in the future has none:
+    its clock was wrong.
+    """
+    times = [_time_of(event) for event in events]
+    past = [time if time and time <= now else None for time in times]
+    last, timed = min([now - OLD, *filter(None, past)]), []
+    for time, event in zip(past, events, strict=True):
+        last = time or last
+        timed.append((last, event))
+    return sorted(timed, key=lambda pair: pair[0])
 
 
 def _time_of(event: dict[str, Any]) -> datetime | None:
+    time = event.get("time")
+    if not isinstance(time, str) or not re.fullmatch(TIME, time, re.ASCII):
+        return None
     try:
-        return datetime.fromisoformat(event["time"]).astimezone()
-    except (KeyError, TypeError, ValueError, OverflowError):
+        return datetime.fromisoformat(time)
+    except ValueError:  # such as 30 February
         return None
 
 
 def _settled() -> dict[str, tuple[Question, Any]]:
-    """Return the questions whose results the learner has seen, with these results."""
+    """Return the questions whose results the learner has seen, with these results.
+
+    A damaged result counts as not seen. The lesson stores it again.
+    """
     seen = progress.predictions()
     return {
         name: (question, seen[name]["is"])
         for name, question in all_questions().items()
-        if question.recall and {"said", "is"} <= seen.get(name, {}).keys()
+        if question.recall
+        and {"said", "is"} <= seen.get(name, {}).keys()
+        and question.fits(seen[name]["is"])
     }
 
 
@@ -180,13 +215,5 @@ def ask(read: Callable[[str], str] | None = None) -> None:
         except EOFError:
             return
         if line:
-            recall(question.name, line if question.choices else _as_numbers(line))
+            recall(question.name, line if question.choices else typed_numbers(line))
         print()
-
-
-def _as_numbers(line: str) -> Any:
-    """Read numbers from a line such as "12.5" or "3, 4"; text stays text."""
-    try:
-        return ast.literal_eval(f"[{line}]" if "," in line and "[" not in line else line)
-    except (ValueError, SyntaxError, RecursionError, MemoryError):
-        return line

@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 
 from floatbase.errors import InputError
-from floatbase.live import robots, scenes, settings, wasm
+from floatbase.live import robots, scenes, wasm
 from floatbase.robots import load
 from floatbase.viewer.web import pages
 
@@ -64,7 +64,7 @@ def write(folder: Path, names: tuple[str, ...] = robots.ROBOTS) -> None:
         (folder / f"{name}.png").write_bytes(image)
     for name in ("robot.js", "engine.js", "floatbase-live.js"):
         shutil.copy(pages.DIST / name, folder / name)
-    (folder / "robot.html").write_text(pages.robot_page(names, settings.ROWS), encoding="utf-8")
+    (folder / "robot.html").write_text(pages.robot_page(names), encoding="utf-8")
     (folder / "meshcat.js").write_bytes(pages.viewer_code())
     (folder / "mujoco.js").write_bytes((mujoco / "mujoco.js").read_bytes())
     (folder / "mujoco.wasm").write_bytes(stripped((mujoco / "mujoco.wasm").read_bytes()))

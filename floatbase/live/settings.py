@@ -1,6 +1,7 @@
 """The settings that a learner can change in the live page and in the playground.
 
-`settings.json` has one row for each setting. Name, unit and range are the same on both pages.
+`settings.json` has one row for each setting. Name, unit and range are the same on both pages. The
+live page contains the table (`make web`), and its engine accepts no other values.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-ROWS: dict[str, dict[str, Any]] = json.loads(
+_ROWS: dict[str, dict[str, Any]] = json.loads(
     Path(__file__).with_name("settings.json").read_text(encoding="utf-8")
 )
 
@@ -39,4 +40,4 @@ class Setting(NamedTuple):
         return " ".join(part for part in (self.name, self.symbol, unit) if part)
 
 
-SETTINGS = {key: Setting(**row) for key, row in ROWS.items()}
+SETTINGS = {key: Setting(**row) for key, row in _ROWS.items()}

@@ -13,7 +13,7 @@ import pytest
 import floatbase.__main__
 from floatbase.errors import InputError
 from floatbase.lessons import compare, predict, progress, recall
-from floatbase.lessons.predictions import is_right
+from floatbase.lessons.predictions import is_right, parse_answer, typed_numbers
 from floatbase.lessons.publish import NOTEBOOKS, site
 from floatbase.lessons.questions import all_questions
 from floatbase.lessons.recalling import PER_DAY, ask, due_questions, question_text
@@ -24,6 +24,11 @@ START = datetime(2026, 3, 2, 9, tzinfo=UTC)
 WEEKS = {0: "00", 1: "01", 7: "02", 9: "03", 14: "04", 21: "05"}  # day -> lesson of that day
 
 
+HERE = Path(__file__).parent
+HISTORIES = json.loads((HERE / "recall_histories.json").read_text(encoding="utf-8"))
+NUMBERS = json.loads((HERE / "typed_numbers.json").read_text(encoding="utf-8"))
+
+needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 pytestmark = pytest.mark.usefixtures("learner")
 
 
@@ -34,7 +39,9 @@ def write(learner, entries):
 def settled(name, day, right, sure=None):
     """A line about a prediction, as `predict` and `compare` write it."""
     time = (START + timedelta(days=day)).isoformat()
-    entry = {"said": 1.0 if right else 2.0, "is": 1.0, "unit": "N", "time": time}
+    question = all_questions()[name]
+    result = question.choices[0] if question.choices else [1.0] * question.count
+    entry = {"said": result if right else "none", "is": result, "unit": "N", "time": time}
     return {name: entry | ({} if sure is None else {"sure": sure})}
 
 
@@ -137,8 +144,9 @@ def test_answers_are_told_and_kept(learner, capsys):
     recall("02.d", 12)
     recall("02.d", "heavy")
     recall("02.c", "they fly")
-    right, wrong, where, unusable, choice = capsys.readouterr().out.splitlines()
+    right, early, wrong, where, _, unusable, choice, _ = capsys.readouterr().out.splitlines()
     assert "right" in right and "43 N" in right and "not yet" in wrong and "lesson 02" in where
+    assert "not due" in early
     assert "number" in unusable and "they fly up" in choice
     kept = [event["knew"] for event in progress.history()["02.d"] if "recalled" in event]
     assert kept == [True, False]
@@ -185,7 +193,7 @@ def time_of(day):
     return (START + timedelta(days=day)).isoformat(timespec="seconds")
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+@needs_node
 def test_the_site_asks_what_recall_asks(learner):
     """due.js and `due_questions` on the same forty histories."""
     random = np.random.default_rng(2)
@@ -196,19 +204,67 @@ def test_the_site_asks_what_recall_asks(learner):
         write(learner, random_history(random, names, data["questions"]))
         expected.append([question.name for question in due_questions(START)])
         cases.append(progress.history())
-    assert {len(names) for names in expected} == {0, 1, 2, 3}
-    program = """
-        require(process.argv[1]);
-        const {rule, questions, cases, now} = JSON.parse(require("fs").readFileSync(0));
-        const due = (history) => floatbaseRules.due(rule, questions, history, now);
-        console.log(JSON.stringify(cases.map(due)));
-    """
+    assert {0, PER_DAY} <= {len(names) for names in expected}
     given = data | {"cases": cases, "now": START.timestamp() * 1000}
+    assert in_node("cases.map((one) => due(rule, questions, one, now))", given) == expected
+
+
+def test_each_history_comes_back_when_it_should(learner):
+    for case, time, is_due in moments():
+        write(learner, [{case["question"]: event} for event in case["events"]])
+        assert bool(due_questions(time)) is is_due, (case["claim"], time)
+
+
+@needs_node
+def test_each_history_comes_back_on_the_site_when_it_should():
+    cases = [({case["question"]: case["events"]}, time) for case, time, _ in moments()]
+    found = in_node(
+        "cases.map(([one, now]) => due(rule, questions, one, Date.parse(now)).length > 0)",
+        site.recall.recall_data([]) | {"cases": [(one, str(time)) for one, time in cases]},
+    )
+    for (case, time, is_due), asked in zip(moments(), found, strict=True):
+        assert asked is is_due, (case["claim"], time)
+
+
+def moments():
+    """The histories of the table with the moments at which their questions are due, or are not."""
+    for case in HISTORIES:
+        for answer in ("not due", "due"):
+            for time in case[answer]:
+                yield case, datetime.fromisoformat(time), answer == "due"
+
+
+def test_typed_numbers_are_those_of_the_table():
+    for row in NUMBERS:
+        said = typed_numbers(row["text"])
+        if row["numbers"] is None:
+            with pytest.raises(InputError):
+                parse_answer(said, "", (), row["count"])
+        else:
+            found = parse_answer(said, "", (), row["count"])
+            assert np.atleast_1d(found).tolist() == row["numbers"], row
+
+
+@needs_node
+def test_the_site_reads_the_numbers_of_the_table():
+    found = in_node("cases.map(({text, count}) => numbersIn(text, count))", {"cases": NUMBERS})
+    assert found == [row["numbers"] for row in NUMBERS]
+
+
+def in_node(expression, given):
+    """The value of an expression of JavaScript with the rules of the site and what is given."""
+    names = ", ".join(given)
+    program = f"""
+        require(process.argv[1]);
+        const {{due, numbersIn}} = floatbaseRules;
+        const {{{names}}} = JSON.parse(require("fs").readFileSync(0));
+        console.log(JSON.stringify({expression}));
+    """
     ran = subprocess.run(
         ["node", "-e", program, str(DUE_SCRIPT)],
         input=json.dumps(given), capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert json.loads(ran.stdout) == expected
+    return json.loads(ran.stdout)
 
 
 def test_the_page_knows_every_question_and_its_result():

@@ -178,6 +178,27 @@ def test_a_reader_answers_lesson_03_reloads_and_hands_in(page, tmp_path, monkeyp
     assert f"of {len(names[::3])}" in calibration
 
 
+@pytest.mark.front_end
+@pytest.mark.parametrize(
+    "kept",
+    [
+        "5",
+        '{"predictions": "x", "exercises": [null], "recalled": 5}',
+        '{"predictions": {"03.a": null, "03.b": {"said": {}}}, "exercises": {"00.1": {}}}',
+    ],
+)
+def test_damaged_answers_in_the_browser_do_no_harm(page, kept):
+    page.evaluate("(kept) => localStorage.setItem('floatbase-answers', kept)", kept)
+    page.reload()
+    form = page.locator(".answers-exercise form")
+    form.locator("input").fill("189.97 N")
+    form.locator("button").click()
+    assert "Write" in form.locator("output").inner_text()
+    form.locator("input").fill("189.97")
+    form.locator("button").click()
+    assert "Right" in form.locator("output").inner_text()
+
+
 @pytest.fixture(scope="module")
 def recalling(tmp_path_factory, browser):
     """A page that asks what is due."""
@@ -195,8 +216,9 @@ def test_a_reader_recalls_with_the_keyboard(recalling, tmp_path, monkeypatch):
     page, box = recalling, recalling.locator(".answers-recall")
     assert "some days after" in box.inner_text()
     said = {"01.d": [1, 2], "01.e": "true", "02.c": "they stay", "02.d": 43.1}
-    entry = {"unit": "", "sure": False, "is": 0, "time": OLD_TIME}
-    predictions = {name: entry | {"said": answer} for name, answer in said.items()}
+    shown = {"01.d": [18, 12], "01.e": "true", "02.c": "they fly up", "02.d": 43.1}
+    entry = {"unit": "", "sure": False, "time": OLD_TIME}
+    predictions = {name: entry | {"said": said[name], "is": shown[name]} for name in said}
     keep = "kept => localStorage.setItem('floatbase-answers', JSON.stringify(kept))"
     page.evaluate(keep, {"predictions": predictions})
     page.reload()

@@ -71,6 +71,13 @@ def test_walks_have_the_targets_of_the_library(found):
         assert walk["distance"] < WALK_TOLERANCE < walk["moved"], walk
 
 
+def test_what_makes_no_sense_is_refused_and_changes_nothing(found):
+    refusals = found["refusals"]
+    assert refusals["tried"] > 70 and refusals["accepted"] == []
+    undisturbed, disturbed = refusals["end"]
+    assert disturbed == undisturbed and disturbed[-1] == ""
+
+
 def test_a_push_recovery_map_is_that_of_the_library(found):
     """Within a step of the bisection."""
     recovery = found["recovery"]

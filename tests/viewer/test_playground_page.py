@@ -253,6 +253,8 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
     page.goto("about:blank")
     page.goto(f"{field.url}#friction+μ+reality=0.3&gait=trot&facets=many&nothing=1")
     eventually(page, lambda: has(gait="trot", friction=(0.7, 0.3)))
+    panel = page.locator("#panel")
+    assert 'facets in the address must be a number from 3 to 16, not "many"' in panel.inner_text()
     page.wait_for_timeout(1500)  # until the page has written its own address
     page.evaluate("location.hash = '#facets=5'")
     eventually(page, lambda: has(facets=5, gait=None, friction=(0.7, 0.7)))

@@ -31,7 +31,7 @@ built["page.html"] = readFileSync("src/page.html", "utf8");
 const digest = createHash("sha256");
 const sources = readdirSync("src", {recursive: true, withFileTypes: true})
   .filter((entry) => entry.isFile()).map(({parentPath, name}) => `${parentPath}/${name}`).sort();
-for (const name of ["build.mjs", "package-lock.json", ...sources]) {
+for (const name of ["build.mjs", "package-lock.json", "../../live/settings.json", ...sources]) {
   const data = readFileSync(name);
   digest.update(`${name} ${data.length}\n`).update(data);
 }

@@ -1,7 +1,8 @@
 // Compare the page's engine with the Python library.
 
-import {createEngine, defaults} from "./src/engine/engine.js";
+import {createEngine} from "./src/engine/engine.js";
 import {pushRecovery} from "./src/engine/recovery.js";
+import {Refusal, defaults} from "./src/engine/settings.js";
 
 const NO_FORCE = 1e-6; // N
 export const FILES = ["states.json", "runs.json", "walks.json", "recovery.json", "go2.json",
@@ -19,11 +20,14 @@ export async function compare(given) {
     engines[name] = createEngine(mj, module, robots[name]);
   }
   const recovery = await compareRecovery();
-  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery};
+  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery,
+    refusals: compareRefusals()};
 }
 
 const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
 const size = (a) => a.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+
+const pushOf = ({force, start, duration}) => ({force, start, duration});
 
 // The outcome of a run in the words of `Rollout.outcome`.
 const outcomeOf = ({outcome}) => outcome === "infeasible" ? "controller failed"
@@ -106,7 +110,7 @@ function compareRuns() {
     const robot = robots[run.robot], engine = engines[run.robot];
     engine.set({...defaults(robot), ...run.settings});
     engine.reset();
-    if (size(run.force) > 0) engine.push(run);
+    if (size(run.force) > 0) engine.push(pushOf(run));
     let distance = 0, firstSecond = 0, moved = 0, end = 0;
     const first = run.com[0];
     for (let step = 0; step < Math.round(run.time / 1e-3); step++) {
@@ -168,7 +172,7 @@ function followStates(walk, rows) {
 }
 function walkAlone(walk, rows) {
   const engine = start(walk);
-  engine.push(walk);
+  engine.push(pushOf(walk));
   let distance = 0, moved = 0;
   const first = rows[0].com;
   for (let step = 0; step < rows.length; step++) {
@@ -187,4 +191,53 @@ async function compareRecovery() {
     pushes.push(push);
   }
   return {pushes, python: given.pushes, resolution: given.resolution};
+}
+
+const NO_SETTINGS = [
+  null, undefined, 5, "mu", [0.5], new Map(), {hop: 1}, {constructor: 1}, {toString: "x"},
+  JSON.parse('{"__proto__": {"mu": 1}}'), {mu: Infinity}, {mu: 1e308}, {mu: -0.5}, {mu: 0},
+  {mu: NaN}, {mu: "0.5"}, {mu: null}, {mu: [0.5]}, {mu: undefined}, {mu: 1n}, {actualMu: 1e308},
+  {payload: -1}, {payload: 1e9}, {gravity: 0}, {gravity: -9.81}, {height: 10}, {forward: NaN},
+  {facets: 5}, {facets: "4"}, {facets: "length"}, {torque: 0}, {torque: 2}, {lifted: "paw"},
+  {lifted: "__proto__"}, {lifted: 0}, {gait: "hop"}, {gait: "constructor"}, {gait: "__proto__"},
+  {gait: "toString"}, {gait: 1}, {gait: ""}, {gait: ["trot"]}, {speed: 50}, {turn: -Infinity},
+  {hasGravity: "no"}, {hasCoriolis: 0}, {missing: null}, {missing: "FL_foot"}, {missing: ["paw"]},
+  {missing: [null]}, {mu: 0.3, gait: "hop"}, {mu: {valueOf: 5, toString: 5}},
+  {mu: Object.create(null)},
+];
+const NO_PUSHES = [
+  null, 5, {}, {force: [1, 0, 0]}, {duration: 0.1}, ...[
+    null, 5, "left", [1, 0], [1, 0, 0, 0], ["1", 0, 0], [NaN, 0, 0], [Infinity, 0, 0],
+    [1e308, 1e308, 0], [1e6, 0, 0],
+  ].map((force) => ({force, duration: 0.1})), ...[
+    {duration: 0}, {duration: -1}, {duration: Infinity}, {duration: "long"}, {body: -1},
+    {body: 1e9}, {body: "base"}, {at: [NaN, 0, 0]}, {at: [1e308, 0, 0]}, {at: null}, {start: NaN},
+    {start: -1}, {start: "now"}, {hop: 1},
+  ].map((change) => ({force: [1, 0, 0], duration: 0.1, ...change})),
+];
+
+// A run among settings and pushes that make no sense, beside one without them.
+function compareRefusals() {
+  const robot = robots.go2, engine = engines.go2, end = [], accepted = [];
+  const tryTo = (call, given) => {
+    try {
+      call();
+      accepted.push(given);
+    } catch (error) {
+      if (!(error instanceof Refusal)) accepted.push(`${given}: ${error}`);
+    }
+  };
+  for (const isDisturbed of [false, true]) {
+    engine.set({...defaults(robot), gait: "trot", speed: 0.3});
+    engine.reset();
+    for (let step = 0; step < 1000; step++) {
+      if (isDisturbed && step % 500 === 0) {
+        NO_SETTINGS.forEach((each, i) => tryTo(() => engine.set(each), `setting ${i}`));
+        NO_PUSHES.forEach((each, i) => tryTo(() => engine.push(each), `push ${i}`));
+      }
+      engine.step();
+    }
+    end.push([...engine.com(), JSON.stringify(engine.settings), engine.outcome]);
+  }
+  return {accepted, end, tried: NO_SETTINGS.length + NO_PUSHES.length};
 }

@@ -54,10 +54,10 @@ def notebook_page() -> str:
     return _page("notebook")
 
 
-def robot_page(robots: tuple[str, ...], settings: dict[str, Any]) -> str:
+def robot_page(robots: tuple[str, ...]) -> str:
     """Return the page with a live robot. It loads its other files from its own folder."""
     scripts = '<script src="meshcat.js"></script><script src="robot.js"></script>'
-    page = _page("robot", scripts, "live robot", {"robots": robots, "settings": settings})
+    page = _page("robot", scripts, "live robot", {"robots": robots})
     return page.replace("<body>", '<body class="robot">')
 
 

@@ -42,20 +42,13 @@ def prediction_form(question: Question, result: dict[str, Any] | None) -> Any | 
 
 def answer_data(question: Question, result: dict[str, Any] | None) -> dict[str, Any] | None:
     """Return what a page needs to ask for a prediction and to judge it."""
-    if result is None or not _fits(question, result["result"]):
+    if result is None or not question.fits(result["result"]):
         return None
     return {
         "name": question.name, "unit": question.unit, "count": question.count,
         "choices": list(question.choices), "result": result["result"],
         "right": accepted(result["result"], question.unit), "shown": result["shown"],
     }  # fmt: skip
-
-
-def _fits(question: Question, result: Any) -> bool:
-    """Return whether a result is one of the choices, or has as many numbers as the question."""
-    if question.choices:
-        return result in question.choices
-    return result is not None and np.size(result) == question.count
 
 
 def exercise_form(exercise: Exercise) -> Any | None:

@@ -38,16 +38,18 @@ def recall_data(lessons: Iterable[Path]) -> dict[str, Any]:
     return {"rule": rule(), "questions": questions}
 
 
-def rule() -> dict[str, float]:
+def rule() -> dict[str, Any]:
     """Return the numbers of the rule that decides which questions are due; pauses in hours."""
     hour = timedelta(hours=1)
     return {
         "perDay": recalling.PER_DAY,
         "first": recalling.FIRST_PAUSE / hour,
         "growth": recalling.GROWTH,
+        "longest": recalling.LONGEST_PAUSE / hour,
         "missed": recalling.MISSED_PAUSE / hour,
         "sureAndMissed": recalling.SURE_AND_MISSED_PAUSE / hour,
         "old": recalling.OLD / hour,
+        "time": recalling.TIME,
     }
 
 

@@ -2,9 +2,10 @@
 // their first values. Such an address can be kept and shared. Controls at the top of the panel are
 // left out: they push the robot or start a challenge.
 
-import {kindOf} from "./controls.js";
+import {kindOf, numberOf} from "./controls.js";
 
 const DELAY = 300; // ms: browsers refuse an address that changes too often
+const MOST_SHOWN = 40; // characters of a text in a message
 const SWITCHES = new Map([["on", true], ["off", false]]);
 
 export const isKept = (command) =>
@@ -22,7 +23,18 @@ export function valueOf(command, text) {
     return number < 0 ? undefined : number;
   }
   if (kind !== "slider") return SWITCHES.get(text);
-  return text.trim() && Number.isFinite(Number(text)) ? Number(text) : undefined;
+  const number = numberOf(text);
+  return number >= command.min && number <= command.max ? number : undefined;
+}
+
+// Why a text is no value of a control.
+export function refusalOf(command, text) {
+  const valid = {
+    choice: () => `one of ${command.choices.join(", ")}`,
+    slider: () => `a number from ${command.min} to ${command.max}`,
+  }[kindOf(command)] ?? (() => "on or off");
+  return `${command.name} in the address must be ${valid()}, not "${text.slice(0, MOST_SHOWN)}". ` +
+    "It keeps its value.";
 }
 
 export const readHash = (hash) => new Map(new URLSearchParams(hash.replace(/^#/, "")));
@@ -31,14 +43,16 @@ export function writeHash(entries) {
   return text && `#${text}`;
 }
 
-// controls: {name: {getValue, setValue}}, those of the panel.
-export function createAddress(controls) {
+// controls: {name: {getValue, setValue}}, those of the panel. say(text): shows what was refused.
+export function createAddress(controls, say) {
   const kept = new Map(); // name -> {command, first: text of the first value}
+  const refused = new Map(); // name -> sentence
   let timer = null;
   const present = ([name, {command}]) => textOf(command, controls[name].getValue());
   function set(name, text) {
     const {command} = kept.get(name), value = valueOf(command, text);
-    if (value !== undefined && text !== present([name, {command}])) controls[name].setValue(value);
+    if (value === undefined) refused.set(name, refusalOf(command, text));
+    else if (text !== present([name, {command}])) controls[name].setValue(value);
   }
   function write() {
     timer = null;
@@ -48,7 +62,10 @@ export function createAddress(controls) {
   }
   addEventListener("hashchange", () => {
     const wanted = readHash(location.hash);
+    const hadRefused = refused.size > 0;
+    refused.clear();
     for (const [name, {first}] of kept) set(name, wanted.get(name) ?? first);
+    if (hadRefused || refused.size > 0) say([...refused.values()].join(" "));
   });
   return {
     // A control is new, or was added again.
@@ -57,7 +74,9 @@ export function createAddress(controls) {
       if (!isKept(command) || kept.has(name)) return;
       kept.set(name, {command, first: present([name, {command}])});
       const text = readHash(location.hash).get(name);
-      if (text !== undefined) set(name, text);
+      if (text === undefined) return;
+      set(name, text);
+      if (refused.has(name)) say([...refused.values()].join(" "));
     },
     changed() { timer ??= setTimeout(write, DELAY); },
   };

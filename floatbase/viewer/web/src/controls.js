@@ -19,6 +19,10 @@ export function rowOf({name, column, section = ""}) {
 export const isUndo = ({key, ctrlKey, metaKey, shiftKey, altKey}) =>
   key.toLowerCase() === "z" && (ctrlKey || metaKey) && !shiftKey && !altKey;
 
+// The number that a text of an address or an attribute means, or NaN.
+export const numberOf = (text) =>
+  /^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?$/i.test(text.trim()) ? Number(text) : NaN;
+
 // Number of decimals of a value that changes in such steps.
 export function digits(step) {
   return Math.max(0, Math.min(6, Math.ceil(-Math.log10(step || 1))));

@@ -88,6 +88,7 @@ function frame(config) {
   window.addEventListener("message", ({data, origin}) => {
     // a page of another site contains this page in a frame
     if (location.protocol !== "file:" && origin !== self.origin) return;
+    if (!(data instanceof Object && ("seen" in data || "frame" in data))) return; // of another
     if ("seen" in data) setNear(data.seen);
     else if (scene === null) waiting.push(data);
     else change(scene, data);

@@ -1,12 +1,15 @@
 // The page with a live robot: `floatbaseRobot.open(config)`. The physics and the controller run in
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
-// config: as for the viewer, with `robots`, the names to choose from, and `settings`, the words and
-// ranges of controls (floatbase/live/settings.json). The address may have
-// ?name=…&mu=…&push=…&gait=…&panel=0.
+// config: as for the viewer, with `robots`, the names to choose from. The address may have
+// ?name=…&mu=…&push=…&gait=…&panel=0. Values that make no sense are refused in words, and count as
+// not given.
 
+import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
+import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
+import {readAddress} from "./live/attributes.js";
 import {controlsOf} from "./live/controls.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
@@ -21,6 +24,7 @@ const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
+const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
   "model and reality": "model: what the controller assumes. reality: what the robot has.",
@@ -31,8 +35,8 @@ const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it 
 
 export function open(config) {
   detachGifWorker();
-  const given = new URLSearchParams(location.search);
-  const name = config.robots.includes(given.get("name")) ? given.get("name") : config.robots[0];
+  const given = readAddress(location.search);
+  const name = given.read("name", choiceRule(config.robots)) ?? config.robots[0];
   document.body.style.setProperty("--first", `url("${name}.png")`);
   if (typeof WebAssembly === "undefined" || location.protocol === "file:") {
     return showNotice("A live robot needs WebAssembly, and a page that comes from a server. " +
@@ -49,8 +53,8 @@ export function open(config) {
 
 async function start(scene, worker, {config, given, name, sight}) {
   const send = (message) => worker.postMessage(message);
-  const mu = Number(given.get("mu")), hasMu = mu > 0;
-  send({start: {name, settings: hasMu ? {mu, actualMu: mu} : {}}});
+  const {low, high} = rows.friction, mu = given.read("mu", numberRule(low, high), numberOf);
+  send({start: {name, settings: mu === undefined ? {} : {mu, actualMu: mu}}});
   const ready = new Promise((resolve, reject) => {
     worker.onmessage = ({data}) => data.error ? reject(new Error(data.error))
       : data.ready && resolve(data.ready);
@@ -68,15 +72,17 @@ async function start(scene, worker, {config, given, name, sight}) {
 }
 
 function live(scene, worker, send, {drawing, settings, robot}, {config, given, name, sight}) {
-  const force = Number(given.get("push")) || 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
-  const push = {force, towards: 90, duration: config.settings.duration.first};
+  const {low, high} = rangeOf("push", robot);
+  const force = given.read("push", numberRule(low, high), numberOf)
+    ?? 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
+  const push = {force, towards: 90, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
   });
   const newtons = make("output", {className: "newtons"});
   document.body.append(newtons);
-  const hasPanel = given.get("panel") !== "0";
+  const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
   let gait = null;
@@ -92,12 +98,12 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     send({set: {gait, lifted: null}});
     if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
   }
-  const first = robot.gaits[given.get("gait")] ? given.get("gait") : null;
+  const first = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
   const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    rows: config.settings, names: config.robots, name, walk,
+    names: config.robots, name, walk,
     open(other) {
-      given.set("name", other);
-      location.search = given;
+      given.texts.set("name", other);
+      location.search = given.texts;
     },
   });
   const changes = new Map(controls.map(({command, change}) => [command.name, change]));
@@ -216,7 +222,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   }
   function text(key, content) {
     scene.handle({type: "set_text", path: "", name: key, text: content,
-      section: key === "active" ? config.settings.torque_limits.section : ""});
+      section: key === "active" ? rows.torque_limits.section : ""});
   }
 
   worker.onmessage = ({data}) => {
@@ -226,17 +232,24 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       if (!isLive) announce();
     }
     if (data.stoodUp) tell(STOOD_UP, performance.now());
-    if (data.error) showNotice(data.error);
+    if (data.isRefusal) refuse(data.error);
+    else if (data.error) showNotice(data.error);
   };
+  // Say why something was refused, in the page and to the page around it.
+  function refuse(content) {
+    tell({rank: -2, text: content, stays: REFUSAL_TIME}, performance.now());
+    parent.postMessage({floatbase: "refused", text: content}, "*");
+  }
   if (first) walk(first);
   let isLive = false;
   function announce() {
     isLive = true;
     document.body.classList.add("live");
     parent.postMessage({floatbase: "live"}, "*");
+    if (given.refused.length) refuse(given.refused.join(" "));
   }
   addEventListener("message", ({data, source}) => {
-    if (source !== parent || !data?.floatbaseSet) return;
+    if (source !== parent || data?.floatbaseSet === undefined) return;
     send({set: data.floatbaseSet});
   });
   window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page

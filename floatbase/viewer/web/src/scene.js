@@ -25,7 +25,9 @@ export function createScene(config) {
     },
     redraw: () => viewer.set_dirty(),
   });
-  const address = config.mode === "live" ? createAddress(panel.controls) : null;
+  const address = config.mode === "live" ? createAddress(panel.controls, (text) => {
+    panel.setText({name: "address", text});
+  }) : null;
   const camera = createCamera(viewer, panel);
   const theme = createTheme(viewer, config);
   const legend = createLegend(camera, theme.colour);

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {isKept, readHash, textOf, valueOf, writeHash} from "../src/address.js";
+import {isKept, readHash, refusalOf, textOf, valueOf, writeHash} from "../src/address.js";
 
 const gait = {name: "gait", value: 0, choices: ["stand", "trot"], section: "walking"};
 const facets = {name: "facets", value: 4, min: 3, max: 16, section: "quadratic program"};
@@ -16,11 +16,19 @@ test("a value survives the way through the address", () => {
   assert.equal(readHash("").size, 0);
 });
 
-test("a text that is no value of the control is ignored", () => {
-  for (const [command, text] of [
-    [gait, "hop"], [gait, "1"], [facets, "many"], [facets, ""], [facets, "Infinity"],
-    [foot, "maybe"], [foot, "constructor"],
-  ]) assert.equal(valueOf(command, text), undefined);
+test("a text that is no value of the control is refused in words", () => {
+  for (const [command, text, words] of [
+    [gait, "hop", /one of stand, trot/], [gait, "1", /one of/], [gait, "constructor", /one of/],
+    ...["many", "", " ", "Infinity", "NaN", "1e308", "0x10", "0b11", "2", "17", "-4", "7 N", "7,5",
+      "constructor", "x".repeat(999)].map((odd) => [facets, odd, /from 3 to 16, not ".{0,40}"/]),
+    [foot, "maybe", /on or off/], [foot, "constructor", /on or off/], [foot, "true", /on or off/],
+  ]) {
+    assert.equal(valueOf(command, text), undefined, text);
+    assert.match(refusalOf(command, text), words);
+  }
+  for (const text of ["3", "16", "+7.5", "1e1", " 4 "]) {
+    assert.equal(valueOf(facets, text), Number(text));
+  }
 });
 
 test("controls at the top of the panel and buttons are not in the address", () => {

@@ -1,9 +1,12 @@
 import assert from "node:assert/strict";
-import {readFileSync} from "node:fs";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
-import {defaults} from "../src/engine/engine.js";
+import {
+  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows,
+} from "../src/engine/settings.js";
+import {numberOf} from "../src/controls.js";
+import {readAddress} from "../src/live/attributes.js";
 import {setParameter} from "../src/engine/tick.js";
 import {controlsOf, labelOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
@@ -114,10 +117,11 @@ test("a sentence stays long enough to be read, and a more important one waits fo
   tell({rank: 6, text: "nothing"}, 500);
   tell({rank: 6, text: "nothing"}, 700);
   assert.deepEqual(said, ["nothing", "friction"]);
+  tell({rank: -2, text: "refused", stays: 5000}, 1400);
+  tell({rank: 0, text: "fell"}, 6300);
+  tell({rank: 6, text: "nothing"}, 6500);
+  assert.deepEqual(said.slice(2), ["refused", "fell"]);
 });
-
-const rows = JSON.parse(readFileSync(
-  new URL("../../../live/settings.json", import.meta.url), "utf8"));
 
 test("a control has its name, its symbol and its unit", () => {
   assert.equal(labelOf(rows.com_x), "CoM x [cm]");
@@ -131,7 +135,7 @@ test("controls begin at the settings of the engine and change what they name", (
   const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
   const chosen = [];
   const made = Object.fromEntries(controlsOf({...data, points, lifted: points.slice(0, 1)},
-    settings, push, {rows, names: ["go2"], name: "go2", open() {}, walk: (gait) => {
+    settings, push, {names: ["go2"], name: "go2", open() {}, walk: (gait) => {
       chosen.push(gait);
     }}).map((control) => [control.command.name, control]));
   for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
@@ -162,6 +166,65 @@ test("controls begin at the settings of the engine and change what they name", (
   const missing = made["foot without ground"];
   assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
   assert.deepEqual(missing.change(0), {set: {missing: []}});
+});
+
+const go2 = {
+  weight: 150, points: [{name: "FL_foot"}, {name: "FR_foot"}], facets: [4, 8], bodies: [0, 1, 2],
+  problems: {"all/4": {lifted: null}, "FL_foot/4": {lifted: "FL_foot"}},
+  walking: {gaits: {trot: {most: [0.6, 0.8]}, walk: {most: [0.2, 0.15]}}}, mu: 0.7, gravity: 9.81,
+};
+
+test("both ends of every control are valid settings, and what is beyond them is refused", () => {
+  checkSettings(defaults(go2), go2);
+  const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
+    points: ["FL_foot", "FR_foot"], gaits: go2.walking.gaits};
+  const made = controlsOf(page, defaults(go2), push, {
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}),
+  });
+  let beyond = 0;
+  for (const {command: {min, max, choices, value}, change} of made) {
+    const ends = choices ? choices.map((_, i) => i) : min === undefined ? [!value] : [min, max];
+    for (const end of ends) checkSettings(change(end)?.set ?? {}, go2);
+    if (min === undefined || !change(max)?.set) continue;
+    beyond++;
+    for (const end of [min - 1e-3, max + 1e-3]) {
+      assert.throws(() => checkSettings(change(end).set, go2), /must be a number from/);
+    }
+  }
+  assert.ok(beyond >= 9);
+});
+
+test("the largest push of the slider is the largest push", () => {
+  const {high} = rangeOf("push", go2), push = {duration: 0.1, start: 0, at: [0, 0, 0], body: 1};
+  assert.equal(high, 375);
+  checkPush({...push, force: [0, -high, 0]}, go2);
+  assert.throws(() => checkPush({...push, force: [1, high, 0]}, go2), /of at most 375/);
+});
+
+test("attributes that make no sense are refused in words and count as not given", () => {
+  const gaits = choiceRule(["trot", "walk"]), friction = numberRule(0.05, 1.5);
+  const sensible = readAddress("?gait=trot&mu=0.6&push=");
+  assert.equal(sensible.read("gait", gaits), "trot");
+  assert.equal(sensible.read("mu", friction, numberOf), 0.6);
+  assert.equal(sensible.read("push", friction, numberOf), undefined); // empty
+  assert.equal(sensible.read("panel", gaits), undefined); // not given
+  assert.deepEqual(sensible.refused, []);
+  for (const gait of ["constructor", "__proto__", "toString", "Trot", "trot ", "hop", "0"]) {
+    const odd = readAddress(new URLSearchParams({gait}));
+    assert.equal(odd.read("gait", gaits), undefined);
+    assert.match(odd.refused[0], /^gait must be one of trot, walk, not "/);
+  }
+  for (const mu of ["Infinity", "NaN", "1e308", "-0.5", "0", "0x1", "0,6", "0.6 N", "−1", "∞"]) {
+    const odd = readAddress(new URLSearchParams({mu}));
+    assert.equal(odd.read("mu", friction, numberOf), undefined);
+    assert.match(odd.refused[0], /^mu must be a number from 0.05 to 1.5, not "/);
+  }
+});
+
+test("a robot without gaits cannot walk", () => {
+  assert.throws(() => checkSettings({gait: "trot"}, {...go2, walking: null}), /gait must be/);
+  assert.throws(() => checkSettings({speed: 0.1}, {...go2, walking: null}), /speed must be/);
+  checkSettings({gait: null, speed: 0}, {...go2, walking: null});
 });
 
 test("the largest multipliers come first", () => {

@@ -3,11 +3,17 @@
 
 {
   const KEY = "floatbase-answers";
-  const LARGEST = 1e15;
   const SITE = new URL("..", document.currentScript.src || location.href); // script: in a folder of it
-  const {due, isRight, within} = globalThis.floatbaseRules;
+  const {due, isAnswer, isRight, numbersIn, within} = globalThis.floatbaseRules;
 
-  // predictions and exercises: name -> entry; recalled: name -> list of answers
+  // predictions and exercises: name -> entry; recalled: name -> list of answers. An entry of
+  // another form is damaged, and left out.
+  const FORMS = {
+    predictions: (entry) => isAnswer(entry?.said),
+    exercises: (entry) => isAnswer(entry?.answer)
+      && [entry.tries, entry.right].every(Number.isInteger),
+    recalled: Array.isArray,
+  };
   const load = () => {
     let found = null;
     try {
@@ -15,8 +21,8 @@
     } catch {
       // damaged, or not allowed
     }
-    const kinds = ["predictions", "exercises", "recalled"];
-    return Object.fromEntries(kinds.map((kind) => [kind, found?.[kind] ?? {}]));
+    return Object.fromEntries(Object.entries(FORMS).map(([kind, isOfForm]) => [kind,
+      Object.fromEntries(Object.entries(found?.[kind] ?? {}).filter(([, one]) => isOfForm(one)))]));
   };
 
   const store = (kind, name, entry) => {
@@ -34,14 +40,6 @@
     const made = Object.assign(document.createElement(tag), attributes);
     made.append(...children);
     return made;
-  };
-
-  // the numbers in a text, or null if it is no such list; a decimal comma makes two numbers of one
-  const numbersIn = (text, count) => {
-    const parts = text.replace(/[[\]()]/g, " ").trim().split(/\s*[,;]\s*|\s+/);
-    const numbers = parts.map((part) => Number(part.replace(/^[−–]/, "-")));
-    const fits = numbers.every((x) => Number.isFinite(x) && Math.abs(x) <= LARGEST);
-    return text.trim() && fits && numbers.length === count ? numbers : null;
   };
 
   const wanted = ({unit, count}) =>

@@ -3,6 +3,7 @@
 
 import {createDynamics} from "./dynamics.js";
 import {contactForces, makeModel} from "./model.js";
+import {checkPush, checkSettings, defaults} from "./settings.js";
 import {NO_ANSWER, createTick, setParameter} from "./tick.js";
 import {createWalk} from "./walk.js";
 
@@ -14,16 +15,6 @@ const SHIFTED = 0.01; // m: near enough to its target to lift a foot
 const LOWER_SPEED = 0.05; // m/s of a foot that is set down
 const LOWER_TIME = 2; // s, at most
 const AIRBORNE = 2; // times the height of the base at the beginning
-
-// Default settings. Friction, payload and each term of eq. (7) have two values: the one that the
-// controller assumes, and the actual one.
-export const defaults = (robot) => ({
-  mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
-  height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
-  gait: null, speed: 0, turn: 0, // m/s and rad/s
-  hasGravity: true, actualHasGravity: true, hasCoriolis: true, actualHasCoriolis: true,
-  missing: [], // contact points that pass through the ground
-});
 
 // mj: MuJoCo. module: the control step's WebAssembly module. robot: its data.
 export function createEngine(mj, module, robot) {
@@ -227,13 +218,20 @@ export function createEngine(mj, module, robot) {
     get lifted() {
       return walk?.feetInAir() ?? (stance.lifted ? [stance.lifted] : []);
     },
+    // Change settings. Changes that make no sense are refused, and the settings stay as they are.
     set(changes) {
+      checkSettings(changes, robot);
       settings = {...settings, ...changes};
       apply();
     },
-    // Push with a force, world frame [N], at a point of a body, in the body's frame [m].
-    push({body = base, at = [0, 0, 0], force, start = steps * STEP, duration}) {
-      pushes.push({body, at, force, start, duration});
+    // Push with a force, world frame [N], at a point of a body, in the body's frame [m]. most: of
+    // the force.
+    push(given, most) {
+      const push = {
+        body: base, at: [0, 0, 0], force: null, start: steps * STEP, duration: null, ...given,
+      };
+      checkPush(push, robot, most);
+      pushes.push(push);
     },
     step() {
       if (qpos.length === 0) refresh();

@@ -47,7 +47,7 @@ function survives(engine, settings, {direction, duration, size}) {
   engine.set(settings);
   engine.reset();
   const force = [size * Math.cos(direction), size * Math.sin(direction), 0];
-  engine.push({force, start: START, duration});
+  engine.push({force, start: START, duration}, Infinity);
   const steps = Math.ceil((START + duration + OBSERVED) / STEP - 1e-9);
   for (let i = 0; i < steps; i++) if (engine.step() !== "") return false;
   return true;

@@ -2,12 +2,14 @@
 // a picture. A page that draws nothing lets the robot rest.
 //
 // From the page: {start}, {set}, {push}, {reset}, {pause}, {step}, {timeScale}, {frame},
-// {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp}, {recovery}, {error}.
+// {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp}, {recovery}, {error}. An error with
+// `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
 import {pushRecovery} from "./recovery.js";
+import {Refusal, SWITCH, check, checkNames, liftedFeet, numberRule} from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
@@ -19,6 +21,7 @@ const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
 const RECENT = 1; // s before a fall, in which a slip counts as its cause
 const SAMPLE = 16; // steps between two checks of the clock and of slipping
+const TIME_SCALES = numberRule(0.01, 1);
 
 async function fetchOk(name) {
   const response = await fetch(name);
@@ -61,8 +64,7 @@ async function start({name, settings}) {
 
 const summary = () => ({
   ...around, bodies: robot.bodies,
-  facets: robot.facets, lifted: [...new Set(Object.values(robot.problems)
-    .map(({lifted}) => lifted).filter(Boolean))],
+  facets: robot.facets, lifted: liftedFeet(robot),
   gaits: robot.walking?.gaits ?? {}, resting,
 });
 
@@ -134,9 +136,15 @@ const handlers = {
     engine?.reset();
     slipTime = null;
   },
-  pause: (isPaused) => clock.pause(isPaused),
+  pause(isPaused) {
+    check("pause", isPaused, SWITCH);
+    clock.pause(isPaused);
+  },
   step: () => clock.single(),
-  timeScale: (scale) => clock.setScale(scale),
+  timeScale(scale) {
+    check("timeScale", scale, TIME_SCALES);
+    clock.setScale(scale);
+  },
   frame: () => { if (engine) frame(); },
   stop: () => { stop = true; },
   async recovery(given) {
@@ -152,8 +160,11 @@ const handlers = {
 
 onmessage = async ({data}) => {
   try {
+    checkNames(data, Object.keys(handlers), "message");
     for (const [key, value] of Object.entries(data)) await handlers[key](value);
   } catch (error) {
-    postMessage({error: String(error?.message ?? error)});
+    postMessage({
+      error: String(error?.message ?? error), isRefusal: error instanceof Refusal,
+    });
   }
 };

@@ -1,34 +1,32 @@
 // Controls of a live robot: commands for the viewer's panel, and what each of them changes.
 
+import {rangeOf, rows} from "../engine/settings.js";
 import {footName} from "./words.js";
 
 const SPEEDS = [1, 0.5, 0.25, 0.1];
 const TERMS = "terms of eq. (7)"; // a section
-const WEIGHT_PER_MASS = 9.81; // m/s²
 
 // The text of a control, such as "CoM x [cm]". row: of the table of settings.
 export const labelOf = ({name, symbol = "", unit = ""}) => (
   [name, symbol, unit && `[${unit}]`].filter((part) => part).join(" "));
 
 // The controls of a robot: [{command, change(value)}]; change returns messages for the worker:
-// {set}, {timeScale} and others. push: {force, towards, duration}, changed in place. rows: of
-// floatbase/live/settings.json. open: called with another robot's name. walk: called with the name
-// of a gait, or null to stand.
-export function controlsOf(robot, settings, push, {rows, names, name, open, walk}) {
+// {set}, {timeScale} and others. push: {force, towards, duration}, changed in place. open: called
+// with another robot's name. walk: called with the name of a gait, or null to stand.
+export function controlsOf(robot, settings, push, {names, name, open, walk}) {
   const control = (label, command, change) => (
     {command: {type: "set_control", path: "", name: label, ...command}, change});
-  // `changes` replaces entries of the row; `column` may be one of them.
-  const slider = (key, value, change, changes = {}) => {
-    const {low: min, high: max, step, section, column, ...row} = {...rows[key], ...changes};
-    const label = column ? `${labelOf(row)} ${column}` : labelOf(row);
+  const slider = (key, value, change, column) => {
+    const {low: min, high: max, step} = rangeOf(key, robot), {section} = rows[key];
+    const label = column ? `${labelOf(rows[key])} ${column}` : labelOf(rows[key]);
     return control(label, {value, min, max, step, section, column}, change);
   };
   const choice = (key, value, choices, change) => (
     control(labelOf(rows[key]), {value, choices, section: rows[key].section}, change));
   const set = (setting, scale = 1) => (value) => ({set: {[setting]: value * scale}});
-  const pair = (key, model, reality, changes = {}) => [
-    slider(key, settings[model], set(model), {...changes, column: "model"}),
-    slider(key, settings[reality], set(reality), {...changes, column: "reality"}),
+  const pair = (key, model, reality) => [
+    slider(key, settings[model], set(model), "model"),
+    slider(key, settings[reality], set(reality), "reality"),
   ];
   const scaled = (key, setting) => (
     slider(key, rows[key].first, set(setting, rows[key].scale)));
@@ -37,12 +35,9 @@ export function controlsOf(robot, settings, push, {rows, names, name, open, walk
       {value: settings[setting], section: TERMS, column}, (value) => ({set: {[setting]: value}})),
   );
 
-  // the largest push is given in robot weights, the largest payload in robot masses
-  const heaviest = Math.max(1, Math.round(rows.payload.high * robot.weight / WEIGHT_PER_MASS));
   const gaits = Object.keys(robot.gaits), feet = [...new Set(robot.points.map(footName))];
   return [
-    slider("push", push.force, (value) => { push.force = value; },
-      {high: 5 * Math.ceil(rows.push.high * robot.weight / 5)}),
+    slider("push", push.force, (value) => { push.force = value; }),
     slider("towards", push.towards, (value) => { push.towards = value; }),
     slider("duration", push.duration, (value) => { push.duration = value; }),
     control("speed", {value: 0, choices: SPEEDS.map((x) => `${x} ×`)}, (value) => (
@@ -51,7 +46,7 @@ export function controlsOf(robot, settings, push, {rows, names, name, open, walk
       open(names[value]);
     }),
     ...pair("friction", "mu", "actualMu"),
-    ...pair("payload", "payload", "actualPayload", {high: heaviest, step: heaviest / 20}),
+    ...pair("payload", "payload", "actualPayload"),
     slider("gravity", settings.gravity, set("gravity")),
     ...(robot.lifted.length ? [choice("lift", 0, ["none", ...robot.lifted.map(footName)],
       (value) => ({set: {lifted: robot.lifted[value - 1] ?? null}}))] : []),

@@ -92,16 +92,16 @@ export function limitOf(frame, robot) {
   return {rank: 6, text: `${calm}: no foot and no motor is at a limit.`};
 }
 
-// Sentences that stay long enough to be read. Of those within one period, the most important one is
-// said.
+// Sentences that stay long enough to be read, `stays` ms. Of those in the meantime, the most
+// important one is said.
 export function createVoice(say, period = 600) {
   let best = null, next = 0;
-  return ({rank, text}, now) => {
-    if (best === null || rank < best.rank) best = {rank, text};
+  return ({rank, text, stays = period}, now) => {
+    if (best === null || rank < best.rank) best = {rank, text, stays};
     if (now < next) return;
     say(best.text);
+    next = now + best.stays;
     best = null;
-    next = now + period;
   };
 }
 
