@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
-# bytes: a text that people write, and a file to which programs add lines for years
-LARGEST_TEXT, LARGEST_LOG = 50_000_000, 1_000_000_000
+# bytes: a text that people write, and a file that programs fill
+LARGEST_TEXT, LARGEST_DATA = 50_000_000, 1_000_000_000
 _NONBLOCK = getattr(os, "O_NONBLOCK", 0)  # with it, opening a pipe does not wait; not on Windows
 
 
@@ -61,6 +61,9 @@ def whole_file(path: Path, keep_link: bool = False) -> Iterator[Path]:
         if path.is_file() and not path.is_symlink():
             shutil.copymode(path, part)
         part.replace(path)
+    except OSError as error:  # the system names no file when a disk is full
+        error.filename = error.filename or str(path)
+        raise
     finally:
         part.unlink(missing_ok=True)
 

@@ -17,7 +17,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from floatbase._files import LARGEST_LOG, open_file, read_file
+from floatbase._files import LARGEST_DATA, open_file, read_file
 from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
@@ -25,7 +25,7 @@ STUDENT = "student"  # name of the entry that holds the learner's id
 _FILE_NAME = "progress.jsonl"
 # characters of a stored answer; the longest right answer in the course has less than 20 000
 _MAX_ANSWER_LENGTH = 100_000
-_unsaved: deque[bytes] = deque()  # lines of this process that could not be written, in order
+unsaved: deque[bytes] = deque()  # lines of this process that could not be written, in order
 
 
 def path() -> Path:
@@ -179,7 +179,7 @@ def append(name: str, entry: dict[str, Any]) -> None:
 def extend(entries: Iterable[tuple[str, dict[str, Any]]]) -> None:
     """Append a line for each entry; see `append`."""
     # starts with the line end, so that a line that a full disk cut short spoils no other
-    _unsaved.extend(("\n" + json.dumps({name: entry})).encode() for name, entry in entries)
+    unsaved.extend(("\n" + json.dumps({name: entry})).encode() for name, entry in entries)
     if problem := storage_problem():
         print(problem)
 
@@ -197,7 +197,7 @@ def storage_problem() -> str:
     try:
         path().parent.mkdir(parents=True, exist_ok=True)
         if path().exists():
-            read_file(path(), LARGEST_LOG)
+            read_file(path(), LARGEST_DATA)
         elif not os.access(path().parent, os.W_OK):
             raise OSError(errno.EACCES, os.strerror(errno.EACCES))
         _write_unsaved()
@@ -212,7 +212,7 @@ def _write_unsaved() -> None:
     """Write the lines that are not in the file yet, each in a single write."""
     while True:
         try:
-            line = _unsaved.popleft()
+            line = unsaved.popleft()
         except IndexError:  # another thread may have written the last one
             return
         try:
@@ -220,7 +220,7 @@ def _write_unsaved() -> None:
                 if file.write(line) < len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except BaseException:
-            _unsaved.appendleft(line)
+            unsaved.appendleft(line)
             raise
 
 
@@ -303,10 +303,10 @@ def from_json(kept: Any) -> Any:
 def _lines() -> list[bytes]:
     """Return the lines of the file, and those that could not be written yet."""
     try:
-        written = read_file(path(), LARGEST_LOG).split(b"\n")
+        written = read_file(path(), LARGEST_DATA).split(b"\n")
     except (OSError, RuntimeError):  # `storage_problem` says why
         written = []
-    return [*written, *_unsaved]
+    return [*written, *unsaved]
 
 
 def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -115,14 +115,14 @@ def import_answers(path: str | Path) -> None:
         If the file cannot be read, or if it is not such a file.
     """
     try:
-        found = json.loads(read_file(path))
+        found = json.loads(read_file(Path(path)))
     except (OSError, TypeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "it is not a file of answers"
-        raise InputError(f"{short_repr(str(path))} cannot be read: {reason}.") from None
+        raise InputError(f"{path} cannot be read: {reason}.") from None
     kinds = ("predictions", "exercises")
     is_ours = isinstance(found, dict) and found.get("form") == FILE_FORMAT
     if not is_ours or not all(isinstance(found.get(kind), dict) for kind in kinds):
-        raise InputError(f"{short_repr(str(path))} is not a file of answers.")
+        raise InputError(f"{path} is not a file of answers.")
     entries = [*_predictions_in(found), *_tries_in(found), *_recalled_in(found)]
     progress.extend(entries)
     print(f"{len(entries)} answers and predictions were added.")

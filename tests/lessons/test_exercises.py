@@ -178,7 +178,7 @@ def test_a_full_disk_is_told_at_once_and_loses_nothing(learner, store, room, cap
         known = progress.load(), progress.history(), progress.student(), stored_letters()
     check("00.1", 3.0)  # the disk has room again
     known[0]["00.1"]["tries"] += 1
-    assert not progress._unsaved
+    assert not progress.unsaved
     assert known == (progress.load(), progress.history(), progress.student(), stored_letters())
     assert "FLOATBASE_HOME" not in capsys.readouterr().out
 

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from messages import raises
+from messages import raises, warns
 from pandas.testing import assert_frame_equal
 
 import floatbase as fb
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InputError, SimulationError, SimulationWarning
 from floatbase.simulation import read_sweep
 
 GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
@@ -168,6 +168,20 @@ def test_a_dask_cluster_gives_the_same_table() -> None:
     for table in (by_address, by_client):
         assert_frame_equal(here, table, check_exact=True)
     assert processes <= workers
+
+
+def test_a_file_that_is_removed_while_the_sweep_runs_is_told_and_the_table_is_whole(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "rows.jsonl"
+
+    def remove(x: int) -> int:
+        file.unlink(missing_ok=True)
+        return x
+
+    with warns(SimulationWarning, "rows.jsonl"):
+        table = fb.sweep(remove, {"x": [1, 2]}, file=file, workers=1, progress=False)
+    assert table["result"].tolist() == [1, 2]
 
 
 def test_other_files_are_refused_and_left_unchanged(tmp_path: Path) -> None:
