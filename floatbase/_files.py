@@ -1,13 +1,37 @@
-"""Write whole files."""
+"""Read and write whole files."""
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+
+# bytes: a text that people write, and a file that programs fill
+LARGEST_TEXT, LARGEST_DATA = 50_000_000, 1_000_000_000
+_NONBLOCK = getattr(os, "O_NONBLOCK", 0)  # with it, opening a pipe does not wait; not on Windows
+
+
+def open_file(path: str | Path, flags: int) -> int:
+    """Open a file by `os.open`. A pipe or a device, which may never end, is an `OSError`."""
+    file = os.open(path, flags | _NONBLOCK, 0o666)
+    if stat.S_ISREG(os.fstat(file).st_mode):
+        return file
+    os.close(file)
+    raise OSError(errno.EINVAL, "it is a folder, a pipe or a device", os.fspath(path))
+
+
+def read_file(path: str | Path, largest: int = LARGEST_TEXT) -> bytes:
+    """Read a whole file. One with more than `largest` bytes is an `OSError`."""
+    with open(path, "rb", opener=open_file) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size <= largest:
+            return file.read(size)
+    raise OSError(errno.EFBIG, f"it is larger than {largest / 1e6:g} MB", os.fspath(path))
 
 
 @contextmanager
@@ -37,6 +61,9 @@ def whole_file(path: Path, keep_link: bool = False) -> Iterator[Path]:
         if path.is_file() and not path.is_symlink():
             shutil.copymode(path, part)
         part.replace(path)
+    except OSError as error:  # the system names no file when a disk is full
+        error.filename = error.filename or str(path)
+        raise
     finally:
         part.unlink(missing_ok=True)
 

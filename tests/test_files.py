@@ -10,12 +10,19 @@ from pathlib import Path
 
 import judges
 import pytest
+from disk import full_disk
 from PIL import Image
 
 import floatbase as fb
 from floatbase._files import whole_file, write_whole
 from floatbase.errors import InputError, ViewerError
-from floatbase.lessons.publish.grades import write_table
+from floatbase.lessons import import_answers
+from floatbase.lessons.publish import prepare_workspace
+from floatbase.lessons.publish.__main__ import main
+from floatbase.lessons.publish.gradebook import Policy, write_gradebook
+from floatbase.lessons.publish.grades import grade_file, write_table
+from floatbase.lessons.publish.notebooks import read_notebook
+from floatbase.simulation import read_sweep
 from floatbase.viewer.export import film
 
 KILLED = """
@@ -121,3 +128,57 @@ def test_a_table_that_cannot_be_written_leaves_the_former_one(tmp_path, monkeypa
     with pytest.raises(InputError, match="No space"):
         write_table([], table)
     assert former and table.read_bytes() == former
+
+
+def make_large(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(10_000_000_000)  # bytes, none of which takes space
+
+
+def same(x: float) -> float:
+    return x
+
+
+KINDS = {
+    "pipe": os.mkfifo,
+    "folder": Path.mkdir,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "endless": lambda path: path.symlink_to("/proc/self/pagemap"),
+    "10 GB": make_large,
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "read",
+    [
+        fb.load_urdf,
+        read_sweep,
+        import_answers,
+        grade_file,
+        read_notebook,
+        lambda path: fb.sweep(same, {"x": [1]}, file=path, workers=1, progress=False),
+        lambda path: write_gradebook("canvas", [], path, path, column="", policy=Policy()),
+    ],
+)
+def test_what_is_no_file_of_a_usual_size_is_refused_at_once(read, kind, tmp_path):
+    path = tmp_path / "file.urdf"
+    KINDS[kind](path)
+    with pytest.raises((InputError, OSError), match="file") as caught:
+        read(path)
+    assert isinstance(caught.value, InputError) or caught.value.strerror
+
+
+def test_a_package_for_which_there_is_no_room_leaves_nothing(tmp_path, capsys):
+    with full_disk(50_000), pytest.raises(SystemExit):
+        main(["assign", "00", "--to", str(tmp_path / "package")])
+    assert "File too large" in capsys.readouterr().err and not [*tmp_path.iterdir()]
+
+
+def test_a_folder_that_is_gone_is_told_before_anything_starts(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(InputError, match="No such file"):
+        prepare_workspace(mine=Path())
+    monkeypatch.chdir(tmp_path)

@@ -65,8 +65,8 @@ def inventory(time: str = "", letters: str = "") -> None:
             f"letters must be {len(QUESTIONS)} letters from {LETTERS}, or {SKIPPED} for no answer; "
             f"you gave {len(given)}."
         )
-    problem = progress.append(_ENTRY.format(time), {"letters": given, "time": progress.now()})
-    print(problem or f"Your answers {time} the course are kept. hand_in(…) includes them.")
+    progress.append(_ENTRY.format(time), {"letters": given, "time": progress.now()})
+    print(f"hand_in(…) includes your answers {time} the course.")
 
 
 def _are_letters(given: Any) -> bool:

@@ -25,9 +25,7 @@ _PART_OF_RESULT, _PART_OF_LARGEST = 0.1, 0.02
 _ROUNDING = 1e-6  # in the unit of the prediction
 _AS_ASCII = str.maketrans("−–\t\xa0", "--  ")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-# of this process: units of the predictions, and predictions that could not be saved
-_units: dict[str, str] = {}
-_unsaved: dict[str, dict[str, Any]] = {}
+_units: dict[str, str] = {}  # of the predictions of this process
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def predict(
     stored = progress.predictions().get(name, {})
     given = answer[0] if len(answer) == 1 else list(answer) or ...
     if given is None or given is Ellipsis:
-        before = (stored | _unsaved.get(name, {})).get("said")
+        before = stored.get("said")
         message = (
             f"you predicted {_quoted_answer(before, unit)} earlier; that still counts."
             if before is not None
@@ -93,8 +91,7 @@ def predict(
     confidence = {} if sure is None else {"sure": as_bool("sure", sure)}
     how = {None: "", True: ", and you are sure", False: ", and you are not sure"}[sure]
     print(f"{name}: you predict {_quoted_answer(said, unit)}{how}.")
-    if problem := _save(name, {"said": said, "unit": unit} | confidence, stored):
-        print(problem)
+    _save(name, {"said": said, "unit": unit} | confidence, stored)
 
 
 def compare(name: str, value: Any) -> None:
@@ -118,13 +115,12 @@ def compare(name: str, value: Any) -> None:
     as_string("name of a prediction", name)
     result: Any = as_string("value", value) if isinstance(value, str) else _stored_result(value)
     stored = progress.predictions().get(name, {})
-    known = stored | _unsaved.get(name, {})
-    unit = _units.get(name, known.get("unit", ""))
+    unit = _units.get(name, stored.get("unit", ""))
     shown = value if isinstance(value, str) else format_result(value, unit)
     data = {"name": name, "result": _rounded_result(result), "shown": shown}
-    beside = _describe_prediction(known, result, unit) if "said" in known else ""
+    beside = _describe_prediction(stored, result, unit) if "said" in stored else ""
     display(ComparedResult(f"{name}: {shown}{beside}", data))
-    if "said" in known and (isinstance(value, str) or np.all(np.isfinite(result))):
+    if "said" in stored and (isinstance(value, str) or np.all(np.isfinite(result))):
         _save(name, {"is": result}, stored)
 
 
@@ -141,13 +137,9 @@ def review(lesson: str = "") -> None:
         all predictions are listed.
     """
     lesson = lesson_name(lesson)
-    stored = progress.predictions()
-    known = {
-        name: stored.get(name, {}) | _unsaved.get(name, {}) for name in sorted({*stored, *_unsaved})
-    }
     shown = {
         name: entry
-        for name, entry in known.items()
+        for name, entry in sorted(progress.predictions().items())
         if "said" in entry and lesson in ("", name, name.split(".")[0])
     }
     if not shown:
@@ -270,15 +262,10 @@ def _describe_error(said: Any, result: Any, unit: str) -> str:
     )
 
 
-def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> str:
-    """Save what is new about a prediction; return what went wrong, or ""."""
-    entry = _unsaved.pop(name, {}) | entry
-    if all(stored.get(key) == value for key, value in entry.items()):
-        return ""
-    problem = progress.append(name, entry | {"time": progress.now()})
-    if problem:
-        _unsaved[name] = entry
-    return problem
+def _save(name: str, entry: dict[str, Any], stored: dict[str, Any]) -> None:
+    """Save what is new about a prediction."""
+    if any(stored.get(key) != value for key, value in entry.items()):
+        progress.append(name, entry | {"time": progress.now()})
 
 
 def parse_answer(answer: Any, unit: str, choices: Sequence[str], count: int) -> Any:

@@ -1,8 +1,8 @@
 """Progress of a learner: tries, answers and predictions, stored in the learner's own file.
 
 Every try and every prediction is one line, appended to the file in a single write. Processes and
-threads that write at the same time need no lock, and an interrupt or a full disk loses at most that
-line. Lines in the file are never changed.
+threads that write at the same time need no lock, and an interrupt loses at most that line. What
+cannot be written is kept in memory, and the learner is told. Lines in the file are never changed.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ import errno
 import inspect
 import json
 import os
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from floatbase._files import LARGEST_DATA, open_file, read_file
 from floatbase._validation import MAX_MAGNITUDE, numeric_copy
 from floatbase.affine import Quadratic
 
@@ -23,6 +25,7 @@ STUDENT = "student"  # name of the entry that holds the learner's id
 _FILE_NAME = "progress.jsonl"
 # characters of a stored answer; the longest right answer in the course has less than 20 000
 _MAX_ANSWER_LENGTH = 100_000
+unsaved: deque[bytes] = deque()  # lines of this process that could not be written, in order
 
 
 def path() -> Path:
@@ -64,7 +67,7 @@ def load() -> dict[str, dict[str, int]]:
 
 
 def record_try(name: str, right: bool, answer: Any = None) -> None:
-    """Record a try of an exercise. If the file cannot be written, the try is lost without an error.
+    """Record a try of an exercise; see `append`.
 
     Parameters
     ----------
@@ -156,8 +159,11 @@ def student() -> str:
     return found if _is_text(found) else ""
 
 
-def append(name: str, entry: dict[str, Any]) -> str:
+def append(name: str, entry: dict[str, Any]) -> None:
     """Append a line about an exercise or a prediction to the file.
+
+    If the file cannot be written, the reason is printed. The line is then kept in memory until a
+    later call can write it.
 
     Parameters
     ----------
@@ -166,22 +172,56 @@ def append(name: str, entry: dict[str, Any]) -> str:
     entry : dict
         What to store. In predictions, "said" and "is" are a number, a list of numbers or a string,
         "unit" is a string, and "sure" is True or False.
-
-    Returns
-    -------
-    str
-        What went wrong and what to do, or "".
     """
+    extend([(name, entry)])
+
+
+def extend(entries: Iterable[tuple[str, dict[str, Any]]]) -> None:
+    """Append a line for each entry; see `append`."""
     # starts with the line end, so that a line that a full disk cut short spoils no other
-    return _append_line(("\n" + json.dumps({name: entry})).encode())
+    unsaved.extend(("\n" + json.dumps({name: entry})).encode() for name, entry in entries)
+    if problem := storage_problem():
+        print(problem)
 
 
 def storage_problem() -> str:
-    """Return why tries and predictions cannot be saved and what to do, or "".
+    """Write what could not be written before; return why it cannot be and what to do, or "".
 
-    This function does not create the file.
+    This function does not create the file if there is nothing to write.
     """
-    return _append_line(b"")
+    lost = "Tries and predictions cannot be saved"
+    advice = (
+        "They are lost when this program or notebook ends. Set FLOATBASE_HOME to a folder that you "
+        "can write to."
+    )
+    try:
+        path().parent.mkdir(parents=True, exist_ok=True)
+        if path().exists():
+            read_file(path(), LARGEST_DATA)
+        elif not os.access(path().parent, os.W_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+        _write_unsaved()
+    except OSError as error:
+        return f"{lost} in {path().parent}: {error.strerror}. {advice}"
+    except RuntimeError:
+        return f"{lost}: there is no home folder. {advice}"
+    return ""
+
+
+def _write_unsaved() -> None:
+    """Write the lines that are not in the file yet, each in a single write."""
+    while True:
+        try:
+            line = unsaved.popleft()
+        except IndexError:  # another thread may have written the last one
+            return
+        try:
+            with open(path(), "ab", buffering=0, opener=open_file) as file:
+                if file.write(line) < len(line):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except BaseException:
+            unsaved.appendleft(line)
+            raise
 
 
 def as_json(answer: Any) -> Any:
@@ -260,34 +300,13 @@ def from_json(kept: Any) -> Any:
     return kept
 
 
-def _append_line(line: bytes) -> str:
-    """Append a line to the file; return what went wrong, or ""."""
-    lost = "Tries and predictions cannot be saved"
-    advice = "Set FLOATBASE_HOME to a folder that you can write to"
-    try:
-        path().parent.mkdir(parents=True, exist_ok=True)
-        if not line and not path().exists():
-            return (
-                "" if os.access(path().parent, os.W_OK) else f"{lost} in {path().parent}. {advice}."
-            )
-        file = os.open(path(), os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-        try:
-            if os.write(file, line) < len(line):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        finally:
-            os.close(file)
-    except OSError as error:
-        return f"{lost} in {path().parent}: {error.strerror}. {advice}."
-    except RuntimeError:
-        return f"{lost}: there is no home folder. {advice}."
-    return ""
-
-
 def _lines() -> list[bytes]:
+    """Return the lines of the file, and those that could not be written yet."""
     try:
-        return path().read_bytes().split(b"\n")
-    except (OSError, RuntimeError):
-        return []
+        written = read_file(path(), LARGEST_DATA).split(b"\n")
+    except (OSError, RuntimeError):  # `storage_problem` says why
+        written = []
+    return [*written, *unsaved]
 
 
 def _entries(text: bytes) -> Iterator[tuple[str, dict[str, Any]]]:

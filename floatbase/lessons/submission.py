@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import floatbase as fb
-from floatbase._files import write_whole
+from floatbase._files import read_file, write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import inventory, progress
@@ -65,7 +65,7 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
     if not tried and not predicted and not letters:
         raise InputError(
             f"There is nothing to hand in yet: {progress.path()} contains no answers and no "
-            f"predictions{f' in lesson {lesson}' if lesson else ''}."
+            f"predictions{f' in lesson {lesson}' if lesson else ''}. {progress.storage_problem()}"
         )
     exercises = {key: {**entry, "answer": answers.get(key)} for key, entry in tried.items()}
     written = {
@@ -115,19 +115,16 @@ def import_answers(path: str | Path) -> None:
         If the file cannot be read, or if it is not such a file.
     """
     try:
-        found = json.loads(Path(path).read_bytes())
+        found = json.loads(read_file(Path(path)))
     except (OSError, TypeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or "it is not a file of answers"
-        raise InputError(f"{short_repr(str(path))} cannot be read: {reason}.") from None
+        raise InputError(f"{path} cannot be read: {reason}.") from None
     kinds = ("predictions", "exercises")
     is_ours = isinstance(found, dict) and found.get("form") == FILE_FORMAT
     if not is_ours or not all(isinstance(found.get(kind), dict) for kind in kinds):
-        raise InputError(f"{short_repr(str(path))} is not a file of answers.")
+        raise InputError(f"{path} is not a file of answers.")
     entries = [*_predictions_in(found), *_tries_in(found), *_recalled_in(found)]
-    for name, entry in entries:
-        if problem := progress.append(name, entry):
-            print(problem)
-            return
+    progress.extend(entries)
     print(f"{len(entries)} answers and predictions were added.")
 
 
@@ -188,9 +185,7 @@ def _own_path(folder: Path, name: str, lesson: str) -> Path:
 def _name_inside(path: Path) -> str | None:
     """Return the learner's name in a file of answers, or None for another kind of file."""
     try:
-        if path.is_symlink() or not path.is_file():
-            return None
-        written = json.loads(path.read_text(encoding="utf-8"))
+        written: Any = None if path.is_symlink() else json.loads(read_file(path))
     except (OSError, ValueError, RecursionError):
         return None
     is_ours = isinstance(written, dict) and written.get("form") == FILE_FORMAT

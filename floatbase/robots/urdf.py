@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
+from floatbase._files import read_file
 from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.robots._checks import has_floating_base
@@ -24,7 +25,7 @@ def read_urdf(path: Path) -> str:
     """Read the text of a URDF file."""
     try:
         # a comment in another encoding does not change the robot
-        return path.read_bytes().decode("utf-8-sig", errors="replace")
+        return read_file(path).decode("utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(

@@ -6,6 +6,7 @@ import fcntl
 import hashlib
 import json
 import os
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from floatbase._files import LARGEST_DATA, open_file, read_file
 from floatbase._validation import short_repr
-from floatbase.errors import InputError, require
+from floatbase.errors import InputError, SimulationWarning, require
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -42,7 +44,7 @@ def read_sweep(path: str | Path) -> DataFrame:
         If the file cannot be read or was not written by a sweep.
     """
     with _file_errors("path", path, "cannot be read", "Give the path of a sweep's file."):
-        content = Path(path).read_bytes()
+        content = read_file(path, LARGEST_DATA)
     return as_frame(_read_rows(path, content))
 
 
@@ -69,7 +71,7 @@ class RowStore:
         if path is None:
             return
         with _file_errors("file", path, "cannot be written to", "Give another file."):
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            self._file = open_file(path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._resume(path, _header(name, points), points)
@@ -86,12 +88,19 @@ class RowStore:
     def close(self) -> None:
         """Close the file and release its lock."""
         if self._file >= 0:
+            if not os.fstat(self._file).st_nlink:
+                warnings.warn(
+                    f"{self._path} was removed while the sweep ran, so no file has its rows. They "
+                    f"are in the table that sweep returns; save the table.",
+                    SimulationWarning,
+                    stacklevel=4,
+                )
             os.close(self._file)
             self._file = -1
 
     def _resume(self, path: str | Path, header: Row, points: Sequence[Row]) -> None:
         """Read the file after checking that it belongs to this sweep, or begin an empty one."""
-        content = Path(path).read_bytes()
+        content = read_file(path, LARGEST_DATA)
         complete_lines = content[: content.rfind(b"\n") + 1]
         if not complete_lines and json.dumps(header).encode().startswith(content):
             os.ftruncate(self._file, 0)
@@ -137,8 +146,6 @@ def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[N
             f'{argument} must be a path, such as "rows.jsonl", not {short_repr(path)}.'
         )
     try:
-        if os.path.exists(path) and not os.path.isfile(path):  # reading a device may never end
-            raise _wrong_file_error(path, "that no sweep has written")
         yield
     except InputError:
         raise

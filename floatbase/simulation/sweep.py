@@ -11,7 +11,8 @@ import traceback
 import uuid
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,7 +64,8 @@ def sweep(
         fastest. Alternatively, one dict of parameters for each point.
     setup : callable, optional
         Called once in each process (on Dask once in each thread), for objects that are slow to make
-        or cannot be pickled. An exception that it raises ends the sweep, and is raised here.
+        or cannot be pickled. An exception that it raises ends the sweep, and is raised here. An
+        exception that this process cannot load becomes a `SimulationError` with its type and text.
     file : str or Path, optional
         Path of a JSON Lines file to which each row is written as it finishes. Running the same
         sweep with the same file resumes it, even after it was killed; at most two points for each
@@ -93,7 +95,8 @@ def sweep(
     MissingDependencyError
         If Dask is needed, but not installed.
     SimulationError
-        If a process or the cluster breaks down. Rows in the file are kept, also after an interrupt.
+        If a process or the cluster breaks down, or if an exception of `setup` cannot be loaded
+        here. Rows in the file are kept, also after an interrupt.
 
     Examples
     --------
@@ -142,6 +145,8 @@ def sweep(
             failed = 0
             with bar:
                 for i, answer in bar:
+                    if isinstance(answer, _Failure):
+                        raise answer.exception()
                     store.add(i, json_points[i] | answer)
                     failed += answer["error"] is not None
                     if failed:
@@ -308,11 +313,11 @@ def _answers(
     executor: AbstractContextManager[tuple[Executor, int]],
     job: _Job,
     pending: list[tuple[int, Row]],
-) -> Generator[tuple[int, Row], None, None]:
-    """Yield the number and row of each pending point as it finishes."""
+) -> Generator[tuple[int, Row | _Failure], None, None]:
+    """Yield the number of each pending point as it finishes, with its row or a failure."""
     if not pending:
         return
-    remaining, submitted = iter(pending), dict[Future[Row | Exception], int]()
+    remaining, submitted = iter(pending), dict[Future[Row | _Failure], int]()
     with executor as (pool, max_submitted):
         while True:
             for i, point in itertools.islice(remaining, max_submitted - len(submitted)):
@@ -332,23 +337,67 @@ def _answers(
                         f"The cluster broke down ({type(error).__name__}: {error}). Start it "
                         "again, and run the same sweep to resume from its file."
                     ) from error
-                if isinstance(answer, Exception):
-                    raise answer
                 yield submitted.pop(future), answer
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """Exception of a worker in a form that every process can load."""
+
+    pickled: bytes
+    text: str
+    note: str
+
+    @staticmethod
+    def of(error: BaseException) -> _Failure:
+        """Pickle an exception, if what is loaded again has its type and its text."""
+        text, kind = _one_line(error), type(error)
+        note = f"in a worker:\n{''.join(traceback.format_exception(error))}"
+        as_made = partial(kind.__new__, kind, *error.args)  # its __init__ may want other arguments
+        forms: list[tuple[Any, Row]] = [(error, {}), (as_made, vars(error)), (as_made, {})]
+        for form in forms:
+            with suppress(BaseException):  # user code may raise anything
+                failure = _Failure(require("cloudpickle", "sweep").dumps(form), text, note)
+                found = failure.exception()
+                if type(found) is kind and _one_line(found) == text:
+                    return failure
+        return _Failure(b"", text, note)
+
+    def exception(self) -> BaseException:
+        """Return the exception, or a `SimulationError` with its text if it cannot be loaded."""
+        try:
+            made, attributes = pickle.loads(self.pickled)
+            error = made if isinstance(made, BaseException) else made()
+            error.__dict__.update(attributes)
+        except Exception:
+            error = SimulationError(self.text)
+        if not isinstance(error, InputError):
+            error.add_note(self.note)
+        return error
+
+
+def _one_line(error: BaseException) -> str:
+    """Return the type and the text of an exception, whose `__str__` may fail."""
+    try:
+        return f"{type(error).__name__}: {error}"
+    except BaseException as failure:  # user code may raise anything
+        return f"{type(error).__name__}: (its text is not available: {type(failure).__name__})"
 
 
 _this_thread = threading.local()  # of a worker: function and token of its present sweep
 
 
-def _run_point(job: _Job, point: Row) -> Row | Exception:
+def _run_point(job: _Job, point: Row) -> Row | _Failure:
     """Return the results of a point as JSON values, or the exception that ends the sweep."""
     # this runs in a worker, and returns the exception because Dask would log it for each point
     try:
         function = _loaded(*job)
         try:
             answer = function(**point)
-        except (Exception, SystemExit) as error:  # sys.exit would end the worker
-            return {"error": f"{type(error).__name__}: {error}"}
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # sys.exit would end the worker
+            return {"error": _one_line(error)}
         results = answer if isinstance(answer, Mapping) else {"result": answer}
         for name in results:
             if not isinstance(name, str) or name in RESERVED_NAMES or name in point:
@@ -360,11 +409,8 @@ def _run_point(job: _Job, point: Row) -> Row | Exception:
             name: as_json_value(f"the function's result {name!r}", value)
             for name, value in results.items()
         } | {"error": None}
-    except InputError as error:
-        return error
-    except Exception as error:
-        error.add_note(f"in a worker:\n{traceback.format_exc()}")
-        return error
+    except BaseException as error:
+        return _Failure.of(error)
 
 
 def _loaded(token: str, payload: bytes) -> Any:

@@ -52,7 +52,7 @@ class Output:
         except OSError as error:
             raise ViewerError(
                 f"Cannot write {target} ({error.strerror}). Choose an existing folder in which you "
-                f"may write."
+                f"may write, with free space."
             ) from None
         return target
 

@@ -211,6 +211,14 @@ tick = jit_cached(make_tick)
 HITS = """
 from floatbase.control.tick.tick import tick
 print(tick(2.0), len(tick.stats.cache_hits))"""
+NO_WRITABLE_FOLDER = """
+from numba.core import caching
+
+def refuse(locator):
+    raise PermissionError(locator.get_cache_path())
+
+caching._CacheLocator.ensure_cache_path = refuse
+"""
 
 
 @pytest.fixture
@@ -223,13 +231,13 @@ def copied(tmp_path: Path) -> Path:
     return copy
 
 
-def run_copied(copy: Path, cache: Path | str = "") -> list[str]:
+def run_copied(copy: Path, cache: Path | str = "", obstacle: str = "") -> list[str]:
     """Run a process on that copy; return what it computes and how often it loaded code.
 
     cache: numba's folder, "" for its default, which is beside the source.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-c", HITS]
+    command = [sys.executable, "-c", obstacle + HITS]
     return subprocess.check_output(command, text=True, cwd=copy.parent, env=environment).split()
 
 
@@ -247,6 +255,7 @@ def test_edited_code_is_recompiled_and_installed_code_is_loaded(copied, tmp_path
     user = tmp_path / "user"
     assert run_copied(copied) == ["6.0", "0"] and run_copied(copied) == ["6.0", "1"]
     assert run_copied(copied, user) == ["6.0", "1"]
+    assert run_copied(copied, obstacle=NO_WRITABLE_FOLDER) == ["6.0", "1"]
     edit_copied(copied)
     assert run_copied(copied, user) == ["24.0", "0"] and run_copied(copied, user) == ["24.0", "1"]
     assert run_copied(copied) == ["24.0", "0"]

@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import os
 import re
 import threading
 from collections import Counter
@@ -13,9 +14,29 @@ from disk import full_disk
 from hints import LIFTED
 
 import floatbase as fb
-from floatbase.lessons import all_exercises, check, progress, reveal, show_progress
+from floatbase.lessons import (
+    all_exercises,
+    check,
+    compare,
+    import_answers,
+    own_numbers,
+    predict,
+    progress,
+    recall,
+    reveal,
+    show_progress,
+)
+from floatbase.lessons.inventory import KEY, inventory, stored_letters
+from floatbase.lessons.submission import FILE_FORMAT
 
 TIMES = 300  # tries of each of those who record at once
+SAVED = json.dumps(
+    {
+        "form": FILE_FORMAT,
+        "exercises": {},
+        "predictions": {"02.i": {"said": 43.1}, "02.e": {"said": 79}},
+    }
+)  # by a page of the site
 
 
 pytestmark = pytest.mark.usefixtures("learner")
@@ -82,28 +103,30 @@ def test_progress_is_kept_and_shown(capsys):
 
 
 @pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])
-def test_a_place_that_cannot_be_written_costs_only_the_memory(tmp_path, monkeypatch, home, capsys):
+def test_a_home_that_cannot_be_written_is_told_and_costs_only_the_memory(
+    tmp_path, monkeypatch, home, capsys
+):
     show_progress()
-    assert "cannot be saved" not in capsys.readouterr().out
+    assert "FLOATBASE_HOME" not in capsys.readouterr().out
     (tmp_path / "file").write_text("")
     monkeypatch.delenv("FLOATBASE_HOME")
     monkeypatch.setenv(home, str(tmp_path / "file"))
-    assert not check("00.1", 3.0).right
-    assert progress.load() == {}
-    show_progress()
-    place = re.escape(str(tmp_path / "file"))
-    said = rf"\nTries and predictions cannot be saved in {place}.*: .*\. Set FLOATBASE_HOME"
-    assert re.search(said, capsys.readouterr().out)
+    for call in (lambda: check("00.1", LIFTED), show_progress):
+        call()
+        printed = capsys.readouterr().out
+        assert f"{tmp_path / 'file'}" in printed and "FLOATBASE_HOME" in printed
+    assert "00.1 ✓" in printed and not progress.path().exists()
 
 
-def test_without_any_home_a_check_still_works(monkeypatch):
+def test_without_any_home_a_check_still_works_and_says_what_is_lost(monkeypatch, capsys):
     def none():
         raise RuntimeError("Could not determine home directory.")
 
     monkeypatch.setenv("FLOATBASE_HOME", "")
     monkeypatch.setattr(Path, "home", none)
     assert not check("00.1", 3.0).right
-    assert progress.load() == {}
+    assert "FLOATBASE_HOME" in capsys.readouterr().out
+    assert progress.load() == {"00.1": {"tries": 1, "right": 0}}
 
 
 DAMAGED = (
@@ -127,14 +150,46 @@ def test_damage_is_left_out_and_left_as_it_is(tmp_path, text, capsys):
     assert (tmp_path / "progress.jsonl").read_text().startswith(text)
 
 
-def test_a_full_disk_costs_one_try(tmp_path):
-    progress.record_try("00.1", True)
-    stored = tmp_path / "progress.jsonl"
-    with full_disk(stored.stat().st_size + 12):  # a part of the line fits
-        progress.record_try("00.1", True)
-        progress.record_try("00.1", True)
-    progress.record_try("00.1", False)
-    assert progress.load() == {"00.1": {"tries": 2, "right": 1}}
+@pytest.mark.parametrize("room", [0, 12])  # bytes: none, or enough for a part of a line
+@pytest.mark.parametrize(
+    "store",
+    [
+        lambda: check("00.1", LIFTED),
+        lambda: own_numbers("s1"),
+        lambda: predict("02.d", 40, unit="N"),
+        lambda: compare("02.d", 69.2),
+        lambda: recall("02.d", 69),
+        lambda: inventory("before", KEY),
+        lambda: import_answers("saved.json"),
+    ],
+)
+def test_a_full_disk_is_told_at_once_and_loses_nothing(learner, store, room, capsys):
+    (learner / "saved.json").write_text(SAVED)
+    predict("02.d", 30, unit="N")
+    compare("02.d", 69.1)
+    check("00.1", 3.0)
+    capsys.readouterr()
+    stored = progress.path()
+    with full_disk(stored.stat().st_size + room):
+        store()
+        assert "FLOATBASE_HOME" in capsys.readouterr().out
+        show_progress()
+        assert "FLOATBASE_HOME" in capsys.readouterr().out
+        known = progress.load(), progress.history(), progress.student(), stored_letters()
+    check("00.1", 3.0)  # the disk has room again
+    known[0]["00.1"]["tries"] += 1
+    assert not progress.unsaved
+    assert known == (progress.load(), progress.history(), progress.student(), stored_letters())
+    assert "FLOATBASE_HOME" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", [os.mkfifo, os.mkdir, lambda path: path.symlink_to("/dev/null")])
+def test_progress_that_is_no_file_is_told_and_never_waits(learner, kind, capsys):
+    kind(progress.path())
+    assert check("00.1", LIFTED).right
+    show_progress()
+    printed = capsys.readouterr().out
+    assert printed.count(f"{learner}:") == 2 and "00.1 ✓" in printed
 
 
 def record_often(name):

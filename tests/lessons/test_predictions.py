@@ -225,11 +225,13 @@ def test_what_cannot_be_kept_lives_with_the_process_and_a_line_says_why(learner,
     compare("05.u", 69.2)
     review("05")
     assert "69 mm" in (line := said()[0]) and "40 mm" in line
-    assert progress.predictions() == {}
+    assert not progress.path().exists()
 
     monkeypatch.setenv("FLOATBASE_HOME", str(learner))  # as soon as it can be kept, it is
-    compare("05.u", 69.2)
-    assert progress.predictions() == {"05.u": {"said": 40, "unit": "mm", "is": 69.2}}
+    predict("05.v", 3, unit="mm")
+    first, *_ = (learner / "progress.jsonl").read_text().split()
+    assert "05.u" in first and len(lines(learner)) == 3
+    assert progress.predictions()["05.u"] == {"said": 40, "unit": "mm", "is": 69.2}
 
 
 def test_a_name_that_was_left_out_is_missed():

@@ -6,19 +6,21 @@ import os
 import resource
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-from messages import raises
+from messages import raises, warns
 from pandas.testing import assert_frame_equal
 
 import floatbase as fb
-from floatbase.errors import InputError, SimulationError
+from floatbase.errors import InputError, SimulationError, SimulationWarning
 from floatbase.simulation import read_sweep
 
 GRID = {"n": [1, 2, 3, 4, 5], "scale": np.array([0.1, 0.3])}
@@ -168,6 +170,20 @@ def test_a_dask_cluster_gives_the_same_table() -> None:
     assert processes <= workers
 
 
+def test_a_file_that_is_removed_while_the_sweep_runs_is_told_and_the_table_is_whole(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "rows.jsonl"
+
+    def remove(x: int) -> int:
+        file.unlink(missing_ok=True)
+        return x
+
+    with warns(SimulationWarning, "rows.jsonl"):
+        table = fb.sweep(remove, {"x": [1, 2]}, file=file, workers=1, progress=False)
+    assert table["result"].tolist() == [1, 2]
+
+
 def test_other_files_are_refused_and_left_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "rows.jsonl"
 
@@ -188,7 +204,7 @@ def test_other_files_are_refused_and_left_unchanged(tmp_path: Path) -> None:
         assert_frame_equal(first, table, check_exact=True)
     assert path.read_bytes() == kept
     header, *lines = kept.splitlines(keepends=True)
-    edited = header + lines[0].replace(b'"x": 1', b'"x": 7')
+    edited = kept.replace(b'"x": 1', b'"x": 7')
     for content in (b"a diary", b"a diary\nof two\n", lines[0], header + b"[]\n", edited):
         path.write_bytes(content)
         with raises(InputError, "rows.jsonl"):
@@ -234,6 +250,58 @@ def test_wrong_arguments_are_reported_before_a_process_starts(
     with raises(InputError, *named):
         fb.sweep(function, grid, **options)
     assert capfd.readouterr().err == ""
+
+
+class WithoutText(Exception):
+    def __str__(self) -> str:
+        sys.exit("no text")
+
+
+class OfTwo(Exception):  # cannot be pickled in Python's way, which passes its text alone
+    def __init__(self, first: int, second: int):
+        super().__init__(f"{first} {second}")
+        self.second = second
+
+
+class Locked(BaseException):
+    def __init__(self) -> None:
+        super().__init__("locked")
+        self.lock = threading.Lock()  # cannot be pickled
+
+
+class Keyword(Exception):
+    def __new__(cls, *, why: str) -> Keyword:
+        return super().__new__(cls, why)
+
+    def __init__(self, *, why: str):
+        super().__init__(why)
+
+
+# what raises; type and text that arrive
+RAISED = {
+    "without text": (WithoutText, WithoutText, None),
+    "two arguments": (partial(OfTwo, 1, 2), OfTwo, "1 2"),
+    "no exception of a program": (Locked, Locked, "locked"),
+    "cannot be made again": (partial(Keyword, why="so"), SimulationError, "Keyword: so"),
+    "of the system": (partial(OSError, 2, "nope", "a.txt"), FileNotFoundError, "a.txt"),
+    "ends a loop": (partial(StopIteration, 3), StopIteration, "3"),
+}
+
+
+def test_an_exception_of_user_code_arrives_whatever_it_is() -> None:
+    def raising(name: str) -> None:
+        raise RAISED[name][0]()
+
+    table = fb.sweep(raising, {"name": list(RAISED)}, workers=1, progress=False)
+    for name, text in zip(table["name"], table["error"], strict=True):
+        make, kind, wanted = RAISED[name]
+        assert text.startswith(type(make()).__name__)
+        assert (wanted or "text").rpartition(": ")[2] in text
+        with pytest.raises(kind, match=wanted) as caught:
+            setup = partial(raising, name)
+            fb.sweep(lambda made, x: x, {"x": [0]}, setup=setup, workers=1, progress=False)
+        assert caught.type is kind and "in raising" in caught.value.__notes__[-1]
+        assert getattr(caught.value, "second", 2) == 2
 
 
 def test_the_bar_counts_points_and_failures_and_can_be_switched_off(

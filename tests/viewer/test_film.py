@@ -2,9 +2,11 @@
 
 import shutil
 import sys
+import tempfile
 from contextlib import closing
 
 import numpy as np
+import psutil
 import pytest
 from browsers import needs_chromium
 from messages import raises, refused
@@ -123,3 +125,26 @@ def test_names_that_javascript_objects_have_are_drawn(tmp_path):
     assert np.ptp(images[0], axis=(0, 1)).min() > 100  # a robot is in it
     for image in images[1:]:
         assert share_of_others(images[0], image) < 0.01
+
+
+@needs_chromium
+@pytest.mark.parametrize("extension", [".png", ".gif", ".mp4"])
+def test_a_file_that_cannot_be_written_leaves_no_browser_and_no_folder(
+    extension, view, tmp_path, monkeypatch, capfd
+):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    before = set(psutil.Process().children(recursive=True))
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Image.Image, "save", full)
+    if extension == ".mp4":
+        monkeypatch.setattr("av.VideoFrame.from_image", full)
+    path = tmp_path / f"push{extension}"
+    refused(lambda: view.save(path, size=SIZE), ViewerError, "No space left on device")
+    assert not set(psutil.Process().children(recursive=True)) - before
+    assert not [*folder.iterdir()] and not path.exists()
+    assert "Traceback" not in capfd.readouterr().err

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator
 
 try:
     import fcntl
@@ -71,15 +72,20 @@ def source_digest(folder: Path = Path(__file__).parent) -> int:
 def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
     """Compile make(source_digest()), cached on disk if possible.
 
-    The function that `make` returns must use its digest.
+    The function that `make` returns must use its digest. Code that was compiled beside the source
+    is loaded even if no folder is writable.
     """
     global cache_error
     function = make(source_digest())
     try:
         cached = jit(cache=True)(function)
-    except RuntimeError:  # numba finds no folder for its cache
-        cache_error = "no folder is writable"
-        return jit(function)
+    except RuntimeError:  # numba finds no folder that it can write to
+        cached = jit(function)
+        if any(_installed_code(Path(function.__code__.co_filename))):
+            cached._cache = _InstalledCache(function)
+        else:
+            cache_error = "no folder is writable"
+        return cached
     if jit_enabled:
         with suppress(OSError):  # a full disk: numba compiles again
             _copy_installed_code(Path(function.__code__.co_filename), Path(cached.stats.cache_path))
@@ -111,11 +117,33 @@ def _copy_installed_code(source: Path, cache: Path) -> None:
     """Copy code compiled beside the source into the cache of a user who cannot write there."""
     cache.mkdir(parents=True, exist_ok=True)
     # data files sort before the index that lists them
-    for file in sorted((source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ci]")):
+    for file in sorted(_installed_code(source)):
         copy = cache / file.name
         if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
             partial_copy = shutil.copy2(file, cache / f"{file.name}.tmp{os.getpid()}")
             os.replace(partial_copy, copy)
+
+
+def _installed_code(source: Path) -> Iterator[Path]:
+    """Return the files compiled beside the source."""
+    return (source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ci]")
+
+
+class _InstalledLocator(InTreeCacheLocator):
+    """Place of the code beside the source, which need not be writable."""
+
+    def ensure_cache_path(self) -> None:
+        """Accept any folder; numba would refuse one that it cannot write to."""
+
+
+class _InstalledImpl(CompileResultCacheImpl):
+    _locator_classes = [_InstalledLocator]  # noqa: RUF012  a list in numba, too
+
+
+class _InstalledCache(FunctionCache):
+    """numba's cache for code beside a read-only source."""
+
+    _impl_class = _InstalledImpl
 
 
 def without_cache(function: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from datetime import datetime
@@ -34,8 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         unread = given.run(given)
     except InputError as error:
         parser.exit(2, f"{error}\n")
-    except OSError as error:
-        parser.exit(2, f"{error.filename} cannot be read or written: {error.strerror}.\n")
+    except shutil.Error as error:  # of the files of a folder
+        parser.exit(2, f"The folder cannot be written: {error.args[0][0][2]}.\n")
+    except OSError as error:  # the system names no file when a disk is full
+        name = error.filename or "A file"
+        parser.exit(2, f"{name} cannot be read or written: {error.strerror}.\n")
     if unread:
         parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
 

@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from floatbase._files import write_whole
+from floatbase._files import read_file, write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.predictions import lesson_name
@@ -139,7 +139,8 @@ def write_gradebook(
 def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]]:
     """Read the header and the rows of a gradebook's export."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        # with line ends of any system
+        text = io.StringIO(read_file(path).decode("utf-8-sig"), newline=None).getvalue()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except UnicodeDecodeError:
@@ -251,7 +252,7 @@ def _comment(result: ExerciseResult) -> str:
 def _read_metadata(path: Path | None) -> dict[str, Any]:
     """Read Gradescope's metadata, or return {} if there are none."""
     try:
-        found = json.loads(path.read_bytes()) if path else None
+        found = json.loads(read_file(path)) if path else None
     except (OSError, ValueError, RecursionError):
         found = None
     is_usable = isinstance(found, dict) and isinstance(found.get("assignment"), dict)
@@ -301,15 +302,13 @@ cd "$place/source"
 
 def write_autograder(folder: Path, *, policy: Policy, own_numbers: bool = False) -> None:
     """Write the folder whose contents, zipped, are an autograder of Gradescope."""
-    from floatbase.lessons.publish.package import copy_package
+    from floatbase.lessons.publish.package import package_copy
 
-    copy_package(folder)
     options = [f"--late-days {policy.late_days}"]
     options += [f"--lessons {' '.join(policy.lessons)}"] if policy.lessons else []
     options += ["--own-numbers"] if own_numbers else []
-    for name, text in {
-        "setup.sh": _SETUP,
-        "run_autograder": _RUN.format(options=" ".join(options)),
-    }.items():
-        (folder / name).write_text(text, encoding="utf-8")
-        (folder / name).chmod(0o755)
+    scripts = {"setup.sh": _SETUP, "run_autograder": _RUN.format(options=" ".join(options))}
+    with package_copy(folder):
+        for name, text in scripts.items():
+            (folder / name).write_text(text, encoding="utf-8")
+            (folder / name).chmod(0o755)

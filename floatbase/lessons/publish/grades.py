@@ -9,8 +9,6 @@ import csv
 import io
 import json
 import math
-import os
-import stat
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,7 +20,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from floatbase._files import write_whole
+from floatbase._files import read_file, write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import progress
 from floatbase.lessons.exercises import all_exercises
@@ -79,11 +77,7 @@ def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
 def _read(path: Path) -> dict[str, Any]:
     """Read a file of `hand_in`."""
     try:
-        # a FIFO or a device in a shared folder must not stop the grading of the others
-        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            is_file = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-            data = file.read(_LARGEST_FILE + 1) if is_file else b""
-        found = None if len(data) > _LARGEST_FILE else json.loads(data)
+        found = json.loads(read_file(path, _LARGEST_FILE))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from None
     except (ValueError, RecursionError):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from floatbase._files import write_whole
+from floatbase._files import LARGEST_DATA, read_file, write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
 from floatbase.lessons.publish.workspace import (
@@ -26,7 +26,7 @@ def read_notebook(path: Path) -> Any:
     import nbformat
 
     try:
-        return nbformat.read(path, as_version=4)
+        return nbformat.reads(read_file(path, LARGEST_DATA).decode(), as_version=4)
     except (nbformat.reader.NotJSONError, nbformat.ValidationError, UnicodeDecodeError):
         raise InputError(f"{path} is not a notebook.") from None
 

@@ -9,7 +9,8 @@ import re
 import shutil
 import zlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeAlias
 
@@ -58,15 +59,24 @@ def lesson_paths(lessons: Sequence[str]) -> dict[str, Path]:
     return {name: known[name] for name in known if name in names}
 
 
-def copy_package(folder: Path) -> None:
-    """Copy what `pip install` needs to a new folder: no tests and nothing that was built."""
+@contextmanager
+def package_copy(folder: Path) -> Iterator[None]:
+    """Copy what `pip install` needs to a new folder: no tests and nothing that was built.
+
+    The folder is removed if the block ends with an error, such as a full disk.
+    """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} exists already. Choose a new folder: --to FOLDER.")
     unwanted = shutil.ignore_patterns("__pycache__", "node_modules", "test", assignment.FILE.name)
-    for name in _FOLDERS:
-        shutil.copytree(_ROOT / name, folder / name, ignore=unwanted)
-    for name in (*_INSTALL, "assets/LICENSES.md"):
-        shutil.copy(_ROOT / name, folder / name)
+    try:
+        for name in _FOLDERS:
+            shutil.copytree(_ROOT / name, folder / name, ignore=unwanted)
+        for name in (*_INSTALL, "assets/LICENSES.md"):
+            shutil.copy(_ROOT / name, folder / name)
+        yield
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def write_assignment(
@@ -79,7 +89,18 @@ def write_assignment(
 ) -> None:
     """Write a package for students with some lessons, and without solutions."""
     paths = lesson_paths([_FIRST_LESSON]) | lesson_paths(lessons)
-    copy_package(folder)
+    with package_copy(folder):
+        _add_lessons(folder, paths)
+        if with_solutions:
+            return
+        _remove_solutions(folder)
+        found = {"lessons": list(lessons), "teacher": teacher, "until": until}
+        target = folder / assignment.FILE.relative_to(_ROOT)
+        write_whole(target, json.dumps(found, indent=1).encode())
+
+
+def _add_lessons(folder: Path, paths: Mapping[str, Path]) -> None:
+    """Add lessons with solutions, and what opens them, to a copy of the package."""
     shutil.copy(_ROOT / "Makefile", folder)
     shutil.copy(_ROOT / ".gitignore", folder)
     (folder / _HUB).parent.mkdir()
@@ -92,12 +113,6 @@ def write_assignment(
     (folder / "notebooks").mkdir()
     for source in [*paths.values(), *sorted(NOTEBOOKS.glob("*.md"))]:
         write_without_outputs(source, folder / "notebooks" / source.name)
-    if with_solutions:
-        return
-    _remove_solutions(folder)
-    found = {"lessons": list(lessons), "teacher": teacher, "until": until}
-    target = folder / assignment.FILE.relative_to(_ROOT)
-    write_whole(target, json.dumps(found, indent=1).encode())
 
 
 def _remove_solutions(folder: Path) -> None:

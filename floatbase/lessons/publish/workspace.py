@@ -12,7 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from floatbase._files import write_whole
+from floatbase._files import LARGEST_DATA, read_file, write_whole
 from floatbase.errors import InputError
 
 _INSTALLED = Path(__file__).parents[2] / "_notebooks"
@@ -44,6 +44,7 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
     mine = folder / MY_FOLDER if mine is None else mine
     try:
         mine.mkdir(parents=True, exist_ok=True)
+        mine.resolve()  # fails if the present folder is gone
     except OSError as error:
         raise InputError(
             f"The folder {mine} cannot be created: {error.strerror}. Choose one that you can write "
@@ -85,7 +86,7 @@ def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
     elif last == present:
         return []
     while os.path.lexists(target):
-        found = _digest(copy.name, target.read_bytes())
+        found = _digest(copy.name, read_file(target, LARGEST_DATA))
         if found == present:
             record[copy.name] = present
             return []
@@ -101,7 +102,7 @@ def update_copy(copy: Path, text: bytes, record: dict[str, str]) -> list[str]:
 def read_record(folder: Path) -> dict[str, str]:
     """Read a folder's record of digests. Without it, every other text counts as edited."""
     try:
-        found = json.loads((folder / _RECORD_FILE).read_bytes())
+        found = json.loads(read_file(folder / _RECORD_FILE))
     except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}

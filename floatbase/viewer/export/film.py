@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -82,17 +83,17 @@ def capture(page: str, target: Path, size: tuple[int, int]) -> None:
 
 def _capture(page: str, target: Path, kind: str, size: tuple[int, int]) -> None:
     """Write a file of a kind such as ".png", in a thread without an event loop."""
-    pictures = _frames(page, size, FRAME_RATES[kind])
-    if kind == ".png":
-        next(pictures).save(target, "png")
-        pictures.close()  # type: ignore[attr-defined]
-    elif kind == ".gif":
-        _write_gif(target, pictures)
-    else:
-        _write_mp4(target, pictures, size)
+    # closed here, whatever happens: a browser can only be ended by the thread that started it
+    with closing(_frames(page, size, FRAME_RATES[kind])) as pictures:
+        if kind == ".png":
+            next(pictures).save(target, "png")
+        elif kind == ".gif":
+            _write_gif(target, pictures)
+        else:
+            _write_mp4(target, pictures, size)
 
 
-def _frames(page: str, size: tuple[int, int], rate: int) -> Iterator[Image]:
+def _frames(page: str, size: tuple[int, int], rate: int) -> Generator[Image, None, None]:
     """Yield the recording at `rate` pictures per second of film, or only the first picture."""
     try:
         from PIL import Image
