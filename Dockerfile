@@ -10,8 +10,8 @@ FROM python:3.12-slim@sha256:78387bc3881b8273120a12ebe6c1ab22b018ccc2c9adf565ae1
 
 # Code is compiled here for any processor of this architecture, so that the first start is as fast as the next.
 ENV NUMBA_CPU_NAME=generic OPENBLAS_NUM_THREADS=1 PIP_NO_CACHE_DIR=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PATH=/opt/venv/bin:$PATH
-# predictions and answers are kept with the lessons, in the volume
-ENV FLOATBASE_HOME=/home/learner/floatbase/.floatbase
+# predictions and answers are kept with the lessons, in the volume; the settings are those of `floatbase lab`
+ENV FLOATBASE_HOME=/home/learner/floatbase/.floatbase JUPYTER_CONFIG_PATH=/opt/floatbase/floatbase/lessons/jupyter
 
 # Pinocchio needs libgomp1, which the slim image lacks
 RUN apt-get update && apt-get install -y --no-install-recommends libgomp1 && rm -rf /var/lib/apt/lists/*
@@ -20,14 +20,11 @@ COPY . /opt/floatbase
 WORKDIR /opt/floatbase
 RUN python -m venv /opt/venv \
     && pip install -q -c environment.txt hatchling editables \
-    && pip install -q -c environment.txt --no-build-isolation -e ".[course,hub]" \
-    && jupyter labextension disable @jupyterlab/apputils-extension:announcements
-RUN python -m floatbase compile
+    && pip install -q -c environment.txt --no-build-isolation -e ".[hub]"
+RUN floatbase compile
 
 # the reader can read everything above, but not write to it
 USER learner
 WORKDIR /home/learner
 EXPOSE 8888
-CMD ["sh", "-c", "python -m floatbase.lessons.publish workspace --to floatbase; exec jupyter lab --ip=0.0.0.0 --no-browser \
-     --LabApp.default_url=/lab/tree/floatbase/00_start_here.ipynb --LabApp.extension_manager=readonly --LabApp.news_url=None \
-     --LanguageServerManager.autodetect=False"]
+CMD ["floatbase", "lab", "floatbase", "--ip=0.0.0.0", "--no-browser"]

@@ -14,7 +14,7 @@
 VENV := .venv
 BIN := $(VENV)/bin
 # uv downloads and installs; where it is missing, pip installs it into .venv first
-UV := $(shell command -v uv)
+UV := $(shell command -v uv 2>/dev/null)
 INSTALL = VIRTUAL_ENV="$(CURDIR)/$(VENV)" $(if $(UV),"$(UV)",$(BIN)/uv) pip install
 
 # Prints the key of .venv (Python version and folder), then the Python that creates it. A Python that is too old or too new prints
@@ -76,7 +76,7 @@ $(VENV)/locked-$(KEY): environment.txt | python
 	@$(if $(UV),"$(UV)" venv -q --seed --python "$(BASE)" $(VENV),"$(BASE)" -m venv $(VENV) && \
 		$(BIN)/python -m pip --disable-pip-version-check install -q -c environment.txt uv) || $(FAILED)
 	@{ $(INSTALL) -q -c environment.txt hatchling editables && \
-		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course]" && touch $@; } 2>&1 | grep -v "^ [-+~] "; test -e $@ || $(FAILED)
+		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course,sweep]" && touch $@; } 2>&1 | grep -v "^ [-+~] "; test -e $@ || $(FAILED)
 
 $(VENV)/installed-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(INSTALL) -q --no-deps --no-build-isolation -e . || $(FAILED)

@@ -21,6 +21,8 @@ with the other's rights.
 import shlex
 import sys
 
+from floatbase.lessons.lab import SETTINGS
+
 c = get_config()  # noqa: F821  JupyterHub defines it
 
 c.JupyterHub.bind_url = "http://:8000"
@@ -42,14 +44,14 @@ c.Spawner.cmd = ["sh", "-c", START, "floatbase"]
 c.Spawner.default_url = "/lab/tree/floatbase/00_start_here.ipynb"
 c.Spawner.start_timeout = 120  # s: many servers start in the first minute of a class
 c.Spawner.http_timeout = 120
-c.Spawner.environment = {"OPENBLAS_NUM_THREADS": "1"}  # one student's matrices do not use all cores
+c.Spawner.environment = {
+    "JUPYTER_CONFIG_PATH": str(SETTINGS),
+    "OPENBLAS_NUM_THREADS": "1",  # one student's matrices do not use all cores
+}
 c.Spawner.args = [
     # other accounts of the machine could connect to a kernel's ports, but not to its sockets
     "--KernelManager.transport=ipc",
     # s after which a kernel without a page ends
     "--MappingKernelManager.cull_idle_timeout=3600",
     "--ServerApp.shutdown_no_activity_timeout=7200",  # s after which an idle server ends
-    "--LabApp.news_url=None",
-    "--LabApp.extension_manager=readonly",
-    "--LanguageServerManager.autodetect=False",
 ]

@@ -1,12 +1,14 @@
-"""Install a wheel or an sdist into an environment of its own and let it print what the README says.
+"""Install a wheel or an sdist into an environment of its own, and check that it works there.
 
-`python .ci/check_package.py dist/floatbase-0.1.0-py3-none-any.whl`; nothing of the repository but
-the README is used.
+`python .ci/check_package.py dist/floatbase-0.1.0-py3-none-any.whl`; of the repository, only the
+README and the lock are used. The base install must print what the README says, find nothing wrong
+with itself, and have the notebooks of the course.
 """
 
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -14,49 +16,65 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+COMMANDS = ("doctor", "lab --help", "robots")
+LESSONS = """
+from pathlib import Path
+import floatbase
+print(*sorted(path.name for path in Path(floatbase.__file__).parent.glob("_notebooks/*.ipynb")))
+"""
 
 
-def printed_by(package: Path, folder: Path) -> str:
-    """What the README's first program prints with this package, run in an empty folder."""
-    venv.create(folder / "venv", with_pip=True)
-    python, place = folder / "venv" / "bin" / "python", folder / "empty"
-    pip = [
-        str(python),
-        "-m",
-        "pip",
-        "--disable-pip-version-check",
-        "install",
-        "-q",
-        "-c",
-        str(ROOT / "environment.txt"),
-    ]
-    subprocess.run([*pip, str(package)], check=True)
-    place.mkdir()
-    program = _block("python")
-    return subprocess.run(
-        [python, "-I", "-c", program], check=True, capture_output=True, text=True, cwd=place
-    ).stdout
+def install(package: Path, place: Path) -> Path:
+    """Make an environment with a package, with uv if it is there; return its folder of programs."""
+    programs = place / "bin"
+    if uv := shutil.which("uv"):
+        subprocess.run([uv, "venv", "-q", "--python", sys.executable, str(place)], check=True)
+        installer = [uv, "pip", "install", "--python", str(programs / "python")]
+    else:
+        venv.create(place, with_pip=True)
+        installer = [str(programs / "python"), "-m", "pip", "install"]
+    lock = str(ROOT / "environment.txt")
+    subprocess.run([*installer, "-q", "-c", lock, str(package)], check=True)
+    return programs
 
 
-def _block(language: str) -> str:
-    found = re.search(
-        rf"^```{language}\n(.*?)^```$",
-        (ROOT / "README.md").read_text("utf-8"),
-        flags=re.MULTILINE | re.DOTALL,
-    )
+def faults_of(package: Path) -> list[str]:
+    """What is wrong with a package; what it prints is printed."""
+    with tempfile.TemporaryDirectory() as folder:
+        programs, place = install(package, Path(folder) / "venv"), Path(folder) / "empty"
+        place.mkdir()
+
+        def printed(program: str, *arguments: str) -> str:
+            command = [str(programs / program), *arguments]
+            return subprocess.run(
+                command, cwd=place, check=True, stdout=subprocess.PIPE, text=True
+            ).stdout
+
+        lessons = printed("python", "-I", "-c", LESSONS).split()
+        for command in COMMANDS:
+            print(printed("floatbase", *command.split()))
+        example = printed("python", "-I", "-c", block("python"))
+        print(f"{package.name}, {package.stat().st_size / 1e6:.2f} MB, prints\n{example}", end="")
+    expected = sorted(path.name for path in (ROOT / "notebooks").glob("*.ipynb"))
+    faults = [f"{package.name} has the lessons {lessons}"] if lessons != expected else []
+    if example != block("text"):
+        faults.append(f"{package.name} does not print what the README says")
+    return faults
+
+
+def block(language: str) -> str:
+    """The first block of a language in the README."""
+    readme = (ROOT / "README.md").read_text("utf-8")
+    found = re.search(rf"^```{language}\n(.*?)^```$", readme, flags=re.MULTILINE | re.DOTALL)
     assert found, language
     return found.group(1)
 
 
 def main() -> int:
-    """The command; 1 when something else is printed."""
-    wrong = 0
-    for package in map(Path, sys.argv[1:]):
-        with tempfile.TemporaryDirectory() as folder:
-            printed = printed_by(package.resolve(), Path(folder))
-        wrong += printed != _block("text")
-        print(f"{package.name}, {package.stat().st_size / 1e6:.2f} MB:\n{printed}", end="")
-    return 1 if wrong or len(sys.argv) < 2 else 0
+    """The command; 1 when something is wrong."""
+    faults = [fault for package in sys.argv[1:] for fault in faults_of(Path(package).resolve())]
+    print(*faults, sep="\n")
+    return 1 if faults or len(sys.argv) < 2 else 0
 
 
 if __name__ == "__main__":

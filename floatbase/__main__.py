@@ -88,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.command in COURSE_COMMANDS:
         from floatbase.lessons.publish.__main__ import main as run_course_command
 
-        run_course_command([options.command, *further])
+        run_course_command([options.command, *further], program="floatbase")
         return 0
     if further and options.command != "lab":
         parser.error(f"unrecognized arguments: {' '.join(further)}")
@@ -150,9 +150,7 @@ def _restart_message(given: Sequence[str], requested_port: int, port: int) -> st
 
     `given` are the arguments of the command line, and `requested_port` is the port among them or 0.
     """
-    command = shlex.join(
-        ["python", "-m", "floatbase", *given, *([] if requested_port else ["--port", str(port)])]
-    )
+    command = shlex.join(["floatbase", *given, *([] if requested_port else ["--port", str(port)])])
     return (
         f"The program has ended. Start it again with\n{command}\n"
         f"and this page reconnects by itself."

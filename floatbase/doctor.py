@@ -9,7 +9,7 @@ from collections import defaultdict
 from importlib.metadata import PackageNotFoundError, requires, version
 
 import floatbase as fb
-from floatbase.viewer.export.film import browser_path
+from floatbase._browser import browser_path
 
 _MAIN = ("pin", "mujoco", "numba", "numpy", "daqp")
 _FOR_DEVELOPERS = {"cluster", "hub", "site", "test"}

@@ -18,7 +18,7 @@ PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
 LAYERS = """
-    conventions errors _validation _assets _files _geometry affine linear_algebra
+    conventions errors _validation _assets _browser _files _geometry affine linear_algebra
     qp
     robots
     dynamics

@@ -145,7 +145,7 @@ class WholeBodyController:
     eq. (5), A q̈ - b, shows how much. See `build_qp`.
 
     The first compiled controller on a machine compiles for about a minute, unless the installation
-    did so (`python -m floatbase compile`). Later processes load the code from disk, and their
+    did so (`floatbase compile`). Later processes load the code from disk, and their
     answers are identical to the bit. Answers of the process that compiled may differ by rounding.
     If the code cannot be kept on disk, `backend_reason` says why.
 

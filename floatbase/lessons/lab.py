@@ -13,8 +13,9 @@ from floatbase.errors import FloatbaseError
 from floatbase.lessons.publish.workspace import prepare_workspace
 
 FIRST = "00_start_here.ipynb"
-# JupyterLab saves twice a minute, and does not look for news and updates
-_SETTINGS = Path(__file__).parent / "jupyter"
+# JupyterLab saves twice a minute, installs no extensions, and does not look for news, updates and
+# language servers
+SETTINGS = Path(__file__).parent / "jupyter"
 _TABS = ".open_tabs"  # kept with the copy, so that tabs of another copy do not open
 
 
@@ -35,7 +36,7 @@ def open_lab(folder: Path, arguments: Sequence[str] = ()) -> None:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    folders = [str(_SETTINGS), *filter(None, [os.environ.get("JUPYTER_CONFIG_PATH")])]
+    folders = [str(SETTINGS), *filter(None, [os.environ.get("JUPYTER_CONFIG_PATH")])]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(folders)
     os.execv(sys.executable, [sys.executable, "-m", "jupyterlab", *_options(folder), *arguments])
 
@@ -45,12 +46,8 @@ def _options(folder: Path) -> list[str]:
     root = folder.resolve()
     options = [
         f"--ServerApp.root_dir={root}",
-        "--ServerApp.ip=127.0.0.1",
         f"--LabApp.default_url=/lab/tree/{FIRST}",
         f"--LabApp.workspaces_dir={root / _TABS}",
-        "--LabApp.extension_manager=readonly",
-        # the course needs no language servers, and the search prints those that are not installed
-        "--LanguageServerManager.autodetect=False",
     ]
     is_root = hasattr(os, "geteuid") and os.geteuid() == 0
     return [*options, "--allow-root"] if is_root else options

@@ -1,4 +1,4 @@
-"""`Playground`: the page of `python -m floatbase view`, also shown in notebooks."""
+"""`Playground`: the page of `floatbase view`, also shown in notebooks."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def test_a_killed_browser_leaves_nothing_behind(viewer, go2, standing, contacts,
     viewer.show(standing, contacts, forces)
     address = viewer.url
     threads = threading.active_count()
-    files = len(os.listdir("/proc/self/fd"))
+    files = len(os.listdir("/dev/fd"))
     entries = len(viewer.window.scene)
     browser = subprocess.Popen(
         [CHROMIUM, *FLAGS, f"--user-data-dir={tmp_path}", "--remote-debugging-port=0", address],
@@ -69,7 +69,7 @@ def test_a_killed_browser_leaves_nothing_behind(viewer, go2, standing, contacts,
         browser.wait(PATIENCE)
     assert slowest < HUNG
     until(lambda: viewer.window.n_pages == 0)
-    until(lambda: len(os.listdir("/proc/self/fd")) <= files)
+    until(lambda: len(os.listdir("/dev/fd")) <= files)
     assert threading.active_count() == threads
     assert len(viewer.window.scene) <= entries + 2  # title and legend
     viewer.show(standing)
@@ -114,14 +114,14 @@ def test_updates_for_a_page_that_never_reads_take_no_memory(window, sleeper):
 
 def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):
     monkeypatch.setattr("floatbase.viewer.transport.connection.TIMEOUT", 0.2)
-    files = len(os.listdir("/proc/self/fd"))
+    files = len(os.listdir("/dev/fd"))
 
     def drawn_and_gone():
         window.put([protocol.set_transform("/meshcat/a", np.eye(4))])
         return window.n_pages == 0
 
     until(drawn_and_gone)
-    until(lambda: len(os.listdir("/proc/self/fd")) < files)
+    until(lambda: len(os.listdir("/dev/fd")) < files)
 
 
 class Kernel:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from floatbase._files import write_whole
-from floatbase.errors import InputError
+from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import (
     NOTEBOOKS,
     README,
@@ -24,17 +24,28 @@ from floatbase.lessons.publish import (
 SOLUTIONS = Path("build/solutions")
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(
+    arguments: Sequence[str] | None = None, program: str = "python -m floatbase.lessons.publish"
+) -> None:
     """Run the command of the command line, or of `arguments`."""
-    parser = ArgumentParser(prog="python -m floatbase.lessons.publish", description=__doc__)
+    parser = ArgumentParser(prog=program, description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     for add_command in _COMMANDS:
         add_command(commands)
     given = parser.parse_args(arguments)
     try:
         unread = given.run(given)
-    except InputError as error:
+    except FloatbaseError as error:
         parser.exit(2, f"{error}\n")
+    except ModuleNotFoundError as error:
+        if str(error.name).startswith("floatbase"):
+            raise
+        extra = "site" if given.command in ("site", "lecture") else "course"
+        parser.exit(
+            2,
+            f"`{given.command}` needs {error.name}, which is not installed. Install it with pip "
+            f'install "floatbase[{extra}]".\n',
+        )
     except shutil.Error as error:  # of the files of a folder
         parser.exit(2, f"The folder cannot be written: {error.args[0][0][2]}.\n")
     except OSError as error:  # the system names no file when a disk is full
@@ -42,6 +53,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.exit(2, f"{name} cannot be read or written: {error.strerror}.\n")
     if unread:
         parser.exit(1, f"{unread} of {len(given.files)} files could not be read.\n")
+
+
+def _check_repository(command: str) -> None:
+    """Check that files are present that only the repository has."""
+    if not (NOTEBOOKS.parent / "pyproject.toml").is_file():
+        raise InputError(
+            f"`{command}` needs the repository of floatbase. Clone the repository, run `make "
+            f"setup` in it, and use .venv/bin/floatbase there."
+        )
 
 
 # one function adds a command and its arguments, and the next one runs it
@@ -83,6 +103,7 @@ def _add_site(commands: Any) -> None:
 
 
 def _site(given: Namespace) -> None:
+    _check_repository(given.command)
     from floatbase.lessons.publish import site
 
     print(site.build(given.to or site.SITE, given.lessons or None, given.stored))
@@ -176,6 +197,7 @@ def _grade(given: Namespace) -> int:
         gradebook.lessons_with_exercises(given.lessons), given.due, given.late_days
     )
     if given.gradescope:
+        _check_repository("grade --gradescope")
         gradebook.write_autograder(given.gradescope, policy=policy, own_numbers=given.own_numbers)
         print(f"The autograder is in {given.gradescope}; zip what is in this folder.")
         return 0
@@ -230,6 +252,7 @@ def _add_assign(commands: Any) -> None:
 
 
 def _assign(given: Namespace) -> None:
+    _check_repository(given.command)
     from floatbase.lessons.publish import package
 
     package.write_assignment(

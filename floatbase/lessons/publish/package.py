@@ -35,8 +35,8 @@ Lessons of an interactive course on controlling floating-base robots:
 
 {lessons}
 
-You need Python 3.11, 3.12 or 3.13 and make. `make lab` opens the lessons in JupyterLab. The first
-run takes a few minutes. Your copies of the lessons are in `notebooks/my`.
+You need make, and Python 3.11 to 3.14 or uv. `make lab` opens the lessons in JupyterLab. The first
+run takes a minute or two. Your copies of the lessons are in `notebooks/my`.
 [Installation and troubleshooting](docs/installation.md) helps when something fails, and
 [How to use the course](notebooks/how_to.md) explains how to hand in your answers.
 """

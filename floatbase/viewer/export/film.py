@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import shutil
 from collections.abc import Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from tqdm.auto import tqdm
 
+from floatbase._browser import browser_path
 from floatbase._files import whole_file
 from floatbase._validation import as_array, short_repr
 from floatbase.errors import InputError, ViewerError
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 FRAME_RATES = {".png": 0, ".mp4": 30, ".gif": 20}
 _MAX_DURATION = 120.0  # s
 _MIN_PIXELS, _MAX_PIXELS = 100, 4000  # pixels
-_BROWSERS = (
-    "chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge",
-)  # fmt: skip
 _FLAGS = [
     "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--disable-quic",
@@ -66,11 +63,6 @@ def checked_size(size: npt.ArrayLike) -> tuple[int, int]:
             f"{_MIN_PIXELS} to {_MAX_PIXELS}."
         )
     return width, height
-
-
-def browser_path() -> str | None:
-    """Return the path of the browser that makes films, or None."""
-    return next(filter(None, map(shutil.which, _BROWSERS)), None)
 
 
 def capture(page: str, target: Path, size: tuple[int, int]) -> None:
