@@ -284,6 +284,8 @@ def pages() -> Faults:
         README,
         conventions,
         equations,
+        lesson_file,
+        lesson_notebooks,
         lesson_table,
         read_notebook,
         readme_with_table,
@@ -293,6 +295,7 @@ def pages() -> Faults:
         NOTEBOOKS / "equations.md": equations.table(),
         NOTEBOOKS / "conventions.md": conventions.page(),
         README: readme_with_table(README.read_text(encoding="utf-8")),
+        **{path: lesson_file(path).decode() for path in lesson_notebooks().values()},
     }
     for path, page in made.items():
         if path.read_text(encoding="utf-8") != page:
