@@ -224,12 +224,14 @@ def copied(tmp_path: Path) -> Path:
     return copy
 
 
-def run_copied(copy: Path, cache: Path | str = "") -> list[str]:
+def run_copied(copy: Path, cache: Path | str = "", processor: str = "") -> list[str]:
     """Run a process on that copy; return what it computes and how often it loaded code.
 
     cache: numba's folder, "" for its default, which is beside the source.
+    processor: for which numba compiles, "" for this one.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
+    environment |= {"NUMBA_CPU_NAME": processor} if processor else {}
     command = [sys.executable, "-c", HITS]
     return subprocess.check_output(command, text=True, cwd=copy.parent, env=environment).split()
 
@@ -251,6 +253,16 @@ def test_edited_code_is_recompiled_and_installed_code_is_loaded(copied, tmp_path
     edit_copied(copied)
     assert run_copied(copied, user) == ["24.0", "0"] and run_copied(copied, user) == ["24.0", "1"]
     assert run_copied(copied) == ["24.0", "0"]
+
+
+@pytest.mark.front_end
+def test_code_for_the_generic_processor_that_a_wheel_brings_is_loaded(copied, tmp_path):
+    user = tmp_path / "user"
+    assert run_copied(copied, copied / "_compiled", "generic") == ["6.0", "0"]
+    assert run_copied(copied, user) == ["6.0", "1"]
+    assert not list(user.rglob("*.nbc"))  # nothing was compiled
+    edit_copied(copied)
+    assert run_copied(copied, user) == ["24.0", "0"]
 
 
 def make_small(digest: int) -> Callable[..., int]:
