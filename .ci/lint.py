@@ -218,7 +218,9 @@ def pythons() -> Faults:
 
 def scripts() -> Faults:
     """Scripts are executable and have no syntax error."""
-    for path in (".binder/postBuild", ".binder/start", ".ci/bounds", ".ci/run"):
+    for path in (
+        ".binder/postBuild", ".binder/start", ".ci/bounds", ".ci/compile_for_wheel", ".ci/run",
+    ):  # fmt: skip
         if (
             not os.access(ROOT / path, os.X_OK)
             or subprocess.run(["bash", "-n", ROOT / path]).returncode
@@ -256,7 +258,9 @@ def workflows() -> Faults:
         yield "publish.yml has a password"
     if (tests + publish).count("persist-credentials: false") < (tests + publish).count("checkout@"):
         yield "a checkout keeps its credentials"
-    if "python -m build --no-isolation" not in publish:
+    if not re.search(rf"compile_for_wheel {re.escape(' '.join(PYTHONS))}$", publish, flags=re.M):
+        yield "publish.yml does not compile the controller for every Python of the package"
+    if "python -m build --no-isolation --sdist --wheel" not in publish:
         yield "publish.yml builds with versions that are not in environment.txt"
 
 
