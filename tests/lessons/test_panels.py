@@ -4,7 +4,6 @@ import asyncio
 import json
 import sys
 import time
-from types import ModuleType
 from unittest.mock import Mock
 
 import ipywidgets
@@ -93,9 +92,7 @@ def test_a_displayed_panel_holds_its_picture(view, beside):
 
 def test_a_panel_shows_its_picture_with_the_older_widgets_of_colab(view, monkeypatch):
     """ipywidgets 7 displays a widget by another method, and Colab loads our code if it is asked."""
-    output = ModuleType("google.colab.output")
-    output.enable_custom_widget_manager = Mock()
-    output._widgets = Mock(_installed_url="https://example.org/manager.js")
+    output = Mock(_widgets=Mock(_installed_url="https://example.org/manager.js"))
     monkeypatch.setitem(sys.modules, "google.colab.output", output)
     monkeypatch.setattr(ipywidgets.Widget, "_ipython_display_", Mock(), raising=False)
     monkeypatch.setattr("anywidget._util.enable_custom_widget_manager_once", Mock())
