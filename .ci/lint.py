@@ -220,7 +220,9 @@ def pythons() -> Faults:
 
 def scripts() -> Faults:
     """Scripts are executable and have no syntax error."""
-    for path in (".binder/postBuild", ".binder/start", ".ci/bounds", ".ci/run"):
+    for path in (
+        ".binder/postBuild", ".binder/start", ".ci/bounds", ".ci/compile_for_wheel", ".ci/run",
+    ):  # fmt: skip
         if (
             not os.access(ROOT / path, os.X_OK)
             or subprocess.run(["bash", "-n", ROOT / path]).returncode
@@ -258,7 +260,9 @@ def workflows() -> Faults:
         yield "publish.yml has a password"
     if (tests + publish).count("persist-credentials: false") < (tests + publish).count("checkout@"):
         yield "a checkout keeps its credentials"
-    if "python -m build --no-isolation" not in publish:
+    if not re.search(rf"compile_for_wheel {re.escape(' '.join(PYTHONS))}$", publish, flags=re.M):
+        yield "publish.yml does not compile the controller for every Python of the package"
+    if "python -m build --no-isolation --sdist --wheel" not in publish:
         yield "publish.yml builds with versions that are not in environment.txt"
 
 
@@ -286,6 +290,8 @@ def pages() -> Faults:
         README,
         conventions,
         equations,
+        lesson_file,
+        lesson_notebooks,
         lesson_table,
         read_notebook,
         readme_with_table,
@@ -295,6 +301,7 @@ def pages() -> Faults:
         NOTEBOOKS / "equations.md": equations.table(),
         NOTEBOOKS / "conventions.md": conventions.page(),
         README: readme_with_table(README.read_text(encoding="utf-8")),
+        **{path: lesson_file(path).decode() for path in lesson_notebooks().values()},
     }
     for path, page in made.items():
         if path.read_text(encoding="utf-8") != page:

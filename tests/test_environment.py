@@ -1,12 +1,15 @@
 """A wheel is complete, and importing the package stays light."""
 
 import json
+import os
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = ("mujoco", "meshcat", "cvxpy", "matplotlib", "numba", "scipy.optimize", "scipy.spatial")
@@ -32,6 +35,21 @@ def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path
     assert not [name for name in packed if "web/src/" in name or "node_modules" in name]
     expected = {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
     assert {name.split("/")[0] for name in packed} == expected
+    run_lesson_of_wheel("02_equations_of_motion.ipynb", wheel, tmp_path)
+
+
+def run_lesson_of_wheel(name, wheel, folder):
+    """Run a lesson in an empty folder, without the repository; it reads robots and meshes."""
+    packages, empty = folder / "packages", folder / "empty"
+    zipfile.ZipFile(wheel).extractall(packages)
+    empty.mkdir()
+    notebook = nbformat.read(packages / "floatbase" / "_notebooks" / name, as_version=4)
+    notebook.cells.append(nbformat.v4.new_code_cell("import floatbase; print(floatbase.__file__)"))
+    client = NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(empty)}})
+    client.execute(env={**os.environ, "PYTHONPATH": str(packages)})
+    (install,) = (cell for cell in notebook.cells if cell.id == "install")
+    assert install.outputs == [] and list(empty.iterdir()) == []
+    assert notebook.cells[-1].outputs[0].text.startswith(str(packages))
 
 
 def test_importing_floatbase_is_light_and_quick():

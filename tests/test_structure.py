@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import json
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import NamedTuple, get_origin
 from messages import raises
 
 import floatbase
+from floatbase.lessons.publish import read_notebook
 
 PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
@@ -91,14 +91,10 @@ def file_of(module):
 
 @cache
 def parsed(path):
-    source = path.read_text(encoding="utf-8")
     if path.suffix == ".ipynb":
-        source = "\n".join(
-            "".join(cell["source"])
-            for cell in json.loads(source)["cells"]
-            if cell["cell_type"] == "code"
-        )
-    return ast.parse(source)
+        cells = read_notebook(path).cells
+        return ast.parse("\n".join(c.source for c in cells if c.cell_type == "code"))
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache

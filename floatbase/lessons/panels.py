@@ -28,7 +28,7 @@ from floatbase.simulation import Controller, LiveSimulation, Push, Rollout, Simu
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
 from floatbase.viewer.export.recording import joint_limits_at, push_at
-from floatbase.viewer.export.thumbnail import with_thumbnail
+from floatbase.viewer.export.thumbnail import panel_bundle
 from floatbase.viewer.transport.notebook_events import receive_during_cells
 
 # width below which only the name and the number of a slider are visible
@@ -39,7 +39,14 @@ _LETTER_WIDTH, _MAX_NAME_WIDTH = 0.55, 10.4
 # sliders ------------------------------------------------------------------------------------------
 
 
-class SliderPanel(widgets.VBox):
+class Panel(widgets.VBox):
+    """Box of widgets that decides itself what a notebook or the site shows."""
+
+    # ipywidgets 7, which Colab has, would otherwise ignore `_repr_mimebundle_`
+    _ipython_display_: Any = None
+
+
+class SliderPanel(Panel):
     """Live picture with sliders, made by `slider_panel`.
 
     Parameters
@@ -101,7 +108,7 @@ class SliderPanel(widgets.VBox):
         if display_mode() == "site":
             return precomputed_panel(self)
         self._picture.children = [self.view.widget()] if self.view else []
-        return with_thumbnail(super()._repr_mimebundle_(**kwargs), *self._picture.children)
+        return panel_bundle(self, *self._picture.children)
 
 
 def _flex_layout(share: int, least: int) -> widgets.Layout:
@@ -363,7 +370,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     return _PushPanel(run, view, max_force, rows)
 
 
-class _PushPanel(widgets.VBox):
+class _PushPanel(Panel):
     """Live picture with controls that push its robot, made by `push_panel`."""
 
     def __init__(
@@ -378,7 +385,7 @@ class _PushPanel(widgets.VBox):
             return recorded_pushes(
                 {"": (self._view, self._run.sim, self._run.controller)}, forces, list(DIRECTIONS)
             )
-        return with_thumbnail(super()._repr_mimebundle_(**kwargs), self.children[0])
+        return panel_bundle(self, self.children[0])
 
 
 class _StatusLine(widgets.Label):

@@ -23,6 +23,7 @@ import numba
 import numpy as np
 import pytest
 from messages import missing, raises
+from numba.core.caching import CacheImpl
 from numba.core.runtime import _nrt_python as counts
 from numba.core.runtime import rtsys
 
@@ -231,12 +232,16 @@ def copied(tmp_path: Path) -> Path:
     return copy
 
 
-def run_copied(copy: Path, cache: Path | str = "", obstacle: str = "") -> list[str]:
+def run_copied(
+    copy: Path, cache: Path | str = "", processor: str = "", obstacle: str = ""
+) -> list[str]:
     """Run a process on that copy; return what it computes and how often it loaded code.
 
     cache: numba's folder, "" for its default, which is beside the source.
+    processor: for which numba compiles, "" for this one.
     """
     environment = os.environ | {"PYTHONPATH": str(copy.parent), "NUMBA_CACHE_DIR": str(cache)}
+    environment |= {"NUMBA_CPU_NAME": processor} if processor else {}
     command = [sys.executable, "-c", obstacle + HITS]
     return subprocess.check_output(command, text=True, cwd=copy.parent, env=environment).split()
 
@@ -259,6 +264,16 @@ def test_edited_code_is_recompiled_and_installed_code_is_loaded(copied, tmp_path
     edit_copied(copied)
     assert run_copied(copied, user) == ["24.0", "0"] and run_copied(copied, user) == ["24.0", "1"]
     assert run_copied(copied) == ["24.0", "0"]
+
+
+@pytest.mark.front_end
+def test_code_for_the_generic_processor_that_a_wheel_brings_is_loaded(copied, tmp_path):
+    user = tmp_path / "user"
+    assert run_copied(copied, copied / "_compiled", "generic") == ["6.0", "0"]
+    assert run_copied(copied, user) == ["6.0", "1"]
+    assert not list(user.rglob("*.nbc"))  # nothing was compiled
+    edit_copied(copied)
+    assert run_copied(copied, user) == ["24.0", "0"]
 
 
 def make_small(digest: int) -> Callable[..., int]:
@@ -310,12 +325,7 @@ def test_a_full_disk_leaves_a_compiled_tick_and_a_warning(small):
 
 
 def test_the_tick_compiles_where_no_folder_can_be_written(small, monkeypatch):
-    def nowhere(*function: object, cache: bool = False) -> Any:
-        if cache:
-            raise RuntimeError("cannot cache function: no locator available")
-        return numba.njit(*function)
-
-    monkeypatch.setattr(jit, "jit", nowhere)
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])
     assert not missing(small(), "no folder", "NUMBA_CACHE_DIR")
 
 

@@ -2,17 +2,22 @@
 
 import asyncio
 import json
+import sys
 import time
+from unittest.mock import Mock
 
+import ipywidgets
 import numpy as np
 import pytest
 import tornado.websocket
+from IPython.core.formatters import DisplayFormatter
 from waiting import until
 
 import floatbase as fb
-from floatbase.lessons import live_run, push_panel, slider_panel
+from floatbase.lessons import lessonC, live_run, push_panel, slider_panel
 from floatbase.lessons.slider_samples import panel_samples
 
+WIDGET = "application/vnd.jupyter.widget-view+json"
 RANGES = [
     (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05),
     (0, 60, 80, 1.0),
@@ -83,6 +88,20 @@ def test_a_displayed_panel_holds_its_picture(view, beside):
     assert picture.children == ()
     data, _ = panel._repr_mimebundle_()
     assert picture.children[0].name == view.robot.name and "image/png" in data
+
+
+def test_a_panel_shows_its_picture_with_the_older_widgets_of_colab(view, monkeypatch):
+    """ipywidgets 7 displays a widget by another method, and Colab loads our code if it is asked."""
+    output = Mock(_widgets=Mock(_installed_url="https://example.org/manager.js"))
+    monkeypatch.setitem(sys.modules, "google.colab.output", output)
+    monkeypatch.setattr(ipywidgets.Widget, "_ipython_display_", Mock(), raising=False)
+    monkeypatch.setattr("anywidget._util.enable_custom_widget_manager_once", Mock())
+    panels = slider_panel(view, lambda x: None, x=(0.0, 1.0, 2.0)), lessonC.ActiveSetGame()
+    for panel in panels:
+        data, metadata = DisplayFormatter().format(panel)
+        assert data[WIDGET]["model_id"] == panel.model_id
+        has_picture = panel is panels[0]
+        assert ("image/png" in data) == ("colab" in metadata.get(WIDGET, {})) == has_picture
 
 
 def test_a_slider_of_integers_has_only_integers():

@@ -103,10 +103,10 @@ def test_another_ground_moves_the_camera_with_the_next_picture_only(go2, standin
 def test_several_pictures_of_a_panel_are_one_image(viewer, standing):
     viewer.show(standing)
     one, two = viewer.widget(), viewer.widget()
-    data, _ = with_thumbnail({}, one, two)
+    data, _ = with_thumbnail(({}, {}), one, two)
     both = Image.open(io.BytesIO(base64.b64decode(data["image/png"])))
     assert both.width == 2 * Image.open(io.BytesIO(one.thumbnail)).width
-    assert with_thumbnail({"text/plain": "x"}) == ({"text/plain": "x"}, {})
+    assert with_thumbnail(({"text/plain": "x"}, {})) == ({"text/plain": "x"}, {})
 
 
 def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(viewer, standing, monkeypatch):
@@ -114,4 +114,4 @@ def test_of_a_panel_without_a_kernel_the_copy_of_its_scene_is_kept(viewer, stand
     copy = viewer.show(standing).widget()
     assert "<iframe" in copy.value
     expected = ({"text/plain": "x", "text/html": copy.value}, {})
-    assert with_thumbnail({"text/plain": "x"}, copy) == expected
+    assert with_thumbnail(({"text/plain": "x"}, {}), copy) == expected

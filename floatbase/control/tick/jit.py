@@ -9,7 +9,6 @@ An edit in any file therefore triggers recompilation.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -18,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator
+from numba.core import caching
 
 try:
     import fcntl
@@ -45,6 +44,7 @@ jit_inline: Callable[..., Any] = partial(numba.njit, inline="always", **_OPTIONS
 jit_forceinline: Callable[..., Any] = partial(numba.njit, forceinline=True, **_OPTIONS)
 jit_allocating: Callable[..., Any] = partial(numba.njit, **_OPTIONS | {"_nrt": True})
 
+COMPILED = Path(__file__).parents[2] / "_compiled"  # what a wheel brings (.ci/compile_for_wheel)
 _LOCK_FILE = "compiling.lock"  # beside the compiled code
 _compiles_ahead = False  # whether this process holds the lock alone
 waiting = False  # whether this process waits for another one that compiles ahead
@@ -77,19 +77,64 @@ def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
     """
     global cache_error
     function = make(source_digest())
-    try:
-        cached = jit(cache=True)(function)
-    except RuntimeError:  # numba finds no folder that it can write to
-        cached = jit(function)
-        if any(_installed_code(Path(function.__code__.co_filename))):
-            cached._cache = _InstalledCache(function)
-        else:
-            cache_error = "no folder is writable"
-        return cached
+    compiled = jit(function)
     if jit_enabled:
-        with suppress(OSError):  # a full disk: numba compiles again
-            _copy_installed_code(Path(function.__code__.co_filename), Path(cached.stats.cache_path))
-    return cached
+        try:
+            compiled._cache = _Cache(function)
+        except RuntimeError:  # numba finds no folder that it can write to
+            if any(next(folder.glob("*.nbi"), None) for folder in _installed_code(function)):
+                compiled._cache = _ReadOnlyCache(function)
+            else:
+                cache_error = "no folder is writable"
+    return compiled
+
+
+def _installed_code(function: Callable[..., Any]) -> Iterator[Path]:
+    """Return the folders of code that was compiled with the installation."""
+    yield Path(function.__code__.co_filename).parent / "__pycache__"
+    yield from COMPILED.glob("*")
+
+
+class _Cache(caching.FunctionCache):
+    """numba's cache, which also finds code that was compiled with the installation.
+
+    This code is beside the source in a container, and in `COMPILED` in a wheel. Code for the
+    generic processor runs on every processor of its architecture.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load code for these types, or return None."""
+        found = super().load_overload(sig, target_context)
+        if found is not None:
+            return found
+        own_key = self._index_key(sig, target_context.codegen())
+        _, (platform, *_), code = own_key
+        name, stamp = self._impl.filename_base, self._impl.locator.get_source_stamp()
+        for folder in _installed_code(self._py_func):
+            files = caching.IndexDataCacheFile(str(folder), name, stamp)
+            for key in (own_key, (sig, (platform, "generic", ""), code)):
+                data = files.load(key)
+                if data is not None:
+                    return self._impl.rebuild(target_context, data)
+        return None
+
+
+# its name before numba 0.62 has an underscore
+_InTreeLocator: Any = getattr(caching, "InTreeCacheLocator", None) or caching._InTreeCacheLocator
+
+
+class _ReadOnlyLocator(_InTreeLocator):
+    """Place of the code beside the source, which need not be writable."""
+
+    def ensure_cache_path(self) -> None:
+        """Accept any folder; numba would refuse one that it cannot write to."""
+
+
+class _ReadOnlyCache(_Cache):
+    """The same cache if no folder is writable."""
+
+    class _impl_class(caching.CompileResultCacheImpl):  # noqa: N801  numba's name
+        _locator_classes = [_ReadOnlyLocator]  # noqa: RUF012  a list in numba, too
 
 
 @contextmanager
@@ -111,39 +156,6 @@ def compile_lock(function: Any, *, ahead: bool = False) -> Iterator[None]:
             yield
         finally:
             _compiles_ahead = False
-
-
-def _copy_installed_code(source: Path, cache: Path) -> None:
-    """Copy code compiled beside the source into the cache of a user who cannot write there."""
-    cache.mkdir(parents=True, exist_ok=True)
-    # data files sort before the index that lists them
-    for file in sorted(_installed_code(source)):
-        copy = cache / file.name
-        if not copy.exists() or copy.stat().st_mtime < file.stat().st_mtime:
-            partial_copy = shutil.copy2(file, cache / f"{file.name}.tmp{os.getpid()}")
-            os.replace(partial_copy, copy)
-
-
-def _installed_code(source: Path) -> Iterator[Path]:
-    """Return the files compiled beside the source."""
-    return (source.parent / "__pycache__").glob(f"{source.stem}.*.nb[ci]")
-
-
-class _InstalledLocator(InTreeCacheLocator):
-    """Place of the code beside the source, which need not be writable."""
-
-    def ensure_cache_path(self) -> None:
-        """Accept any folder; numba would refuse one that it cannot write to."""
-
-
-class _InstalledImpl(CompileResultCacheImpl):
-    _locator_classes = [_InstalledLocator]  # noqa: RUF012  a list in numba, too
-
-
-class _InstalledCache(FunctionCache):
-    """numba's cache for code beside a read-only source."""
-
-    _impl_class = _InstalledImpl
 
 
 def without_cache(function: Any) -> Any:

@@ -19,12 +19,12 @@ from floatbase.behaviours import capture_point, neutral_point, support_margin
 from floatbase.lessons import props
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.lesson08.helpers import state_with_moved_body
-from floatbase.lessons.panels import labelled_slider, live_run
+from floatbase.lessons.panels import Panel, labelled_slider, live_run
 from floatbase.lessons.slider_samples import recorded_pushes
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer import Picture, Viewer, shapes, status_message
 from floatbase.viewer.export.display_mode import display_mode
-from floatbase.viewer.export.thumbnail import with_thumbnail
+from floatbase.viewer.export.thumbnail import panel_bundle
 from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
@@ -122,7 +122,7 @@ def foothold_marks(view: Viewer, places: Mapping[str, npt.ArrayLike]) -> Picture
     return picture
 
 
-class PushComparison(widgets.VBox):
+class PushComparison(Panel):
     """Robots side by side, each with its own controller, pushed by the same sliders."""
 
     def __init__(self, controllers: Mapping[str, Any]):
@@ -188,7 +188,4 @@ class PushComparison(widgets.VBox):
             return recorded_pushes(titles, _RECORDED_PUSHES, ["forwards", "to the left"])
         for title, picture in self._pictures.items():
             picture.children = [self.views[title].widget()]
-        return with_thumbnail(
-            super()._repr_mimebundle_(**kwargs),
-            *(picture.children[0] for picture in self._pictures.values()),
-        )
+        return panel_bundle(self, *(picture.children[0] for picture in self._pictures.values()))

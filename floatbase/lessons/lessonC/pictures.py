@@ -20,9 +20,11 @@ import floatbase as fb
 from floatbase._validation import Array
 from floatbase.lessons import qp_plots, static_export
 from floatbase.lessons.lessonC.helpers import corner_table, table_top
+from floatbase.lessons.panels import Panel
 from floatbase.lessons.rounding import rounded
 from floatbase.qp import QP
 from floatbase.viewer.export.display_mode import display_mode
+from floatbase.viewer.export.thumbnail import panel_bundle
 from floatbase.viewer.scene.colours import GREYS
 
 _BESIDE = (-4.2, 3.4, -2.3, 3.2)  # visible range of the table and its walls
@@ -47,7 +49,7 @@ def show_table(lowest: float) -> str:
     )
 
 
-class ActiveSetGame(widgets.VBox):
+class ActiveSetGame(Panel):
     """Game in which you solve a QP in the plane by hand."""
 
     def __init__(self, puzzles: Sequence[tuple[float, float]] = PUZZLES):
@@ -95,9 +97,7 @@ class ActiveSetGame(widgets.VBox):
         self._show()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        return (
-            self._site_bundle() if display_mode() == "site" else super()._repr_mimebundle_(**kwargs)
-        )
+        return self._site_bundle() if display_mode() == "site" else panel_bundle(self)
 
     def _site_bundle(self) -> dict[str, Any]:
         """Return the mimebundle for a static page: every set of constraints with every bowl."""

@@ -7,6 +7,7 @@ from floatbase.lessons.publish.contents import README, lesson_table, readme_with
 from floatbase.lessons.publish.duration import lesson_counts, lesson_minutes
 from floatbase.lessons.publish.notebooks import (
     execute_notebook,
+    lesson_file,
     read_notebook,
     run_and_store,
     with_solutions,
@@ -34,6 +35,7 @@ __all__ = [
     "execute_notebook",
     "grades",
     "lesson_counts",
+    "lesson_file",
     "lesson_minutes",
     "lesson_notebooks",
     "lesson_table",

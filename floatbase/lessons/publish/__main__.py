@@ -14,6 +14,7 @@ from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import (
     NOTEBOOKS,
     README,
+    lesson_file,
     lesson_notebooks,
     prepare_workspace,
     readme_with_table,
@@ -80,7 +81,10 @@ def _run(given: Namespace) -> None:
 
 
 def _add_map(commands: Any) -> None:
-    text = "write equations.md, conventions.md and the README's table of lessons"
+    text = (
+        "write equations.md, conventions.md, the README's table of lessons, and the cell of each "
+        "lesson that installs the course"
+    )
     commands.add_parser("map", help=text).set_defaults(run=_map)
 
 
@@ -91,6 +95,8 @@ def _map(given: Namespace) -> None:
     write_whole(NOTEBOOKS / "equations.md", equations.table().encode())
     write_whole(NOTEBOOKS / "conventions.md", conventions.page().encode())
     write_whole(README, readme.encode())
+    for lesson in lesson_notebooks().values():
+        write_whole(lesson, lesson_file(lesson))
 
 
 def _add_site(commands: Any) -> None:

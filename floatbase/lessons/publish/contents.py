@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from floatbase.lessons.publish.hosted import colab_address
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
 
@@ -14,11 +15,14 @@ _END = "<!-- end of lessons -->\n"
 
 
 def lesson_table() -> str:
-    """Write the table of lessons as Markdown: number, title, equations."""
+    """Write the table of lessons as Markdown: number, title, equations, and a link to Colab."""
     lines = ["| | lesson | equations |", "|---|---|---|"]
     for lesson, path in lesson_notebooks().items():
-        title = title_of(path).split(" · ")[-1]
-        lines.append(f"| {lesson} | [{title}](notebooks/{path.name}) | {equation_ranges(path)} |")
+        title, colab = title_of(path).split(" · ")[-1], colab_address(path)
+        badge = f" [open in Colab]({colab})" if colab else ""
+        lines.append(
+            f"| {lesson} | [{title}](notebooks/{path.name}){badge} | {equation_ranges(path)} |"
+        )
     return "\n".join(lines).replace("|  |", "| |") + "\n"
 
 

@@ -11,10 +11,13 @@ from typing import Any
 from floatbase._files import LARGEST_DATA, read_file, write_whole
 from floatbase.errors import InputError
 from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.publish import hosted
 from floatbase.lessons.publish.workspace import (
+    NOTEBOOKS,
     lesson_notebooks,
     read_record,
     update_copy,
+    without_install_cell,
     write_record,
 )
 
@@ -22,13 +25,28 @@ from floatbase.lessons.publish.workspace import (
 
 
 def read_notebook(path: Path) -> Any:
-    """Read a notebook. Raises `InputError` if the file is not a notebook."""
+    """Read a notebook without the cell that installs the course.
+
+    Raises `InputError` if the file is not a notebook.
+    """
     import nbformat
 
     try:
-        return nbformat.reads(read_file(path, LARGEST_DATA).decode(), as_version=4)
+        notebook = nbformat.reads(read_file(path, LARGEST_DATA).decode(), as_version=4)
     except (nbformat.reader.NotJSONError, nbformat.ValidationError, UnicodeDecodeError):
         raise InputError(f"{path} is not a notebook.") from None
+    notebook.cells = without_install_cell(notebook.cells)
+    return notebook
+
+
+def lesson_file(path: Path, notebook: Any = None) -> bytes:
+    """Return the file of a lesson; one of the course has the cell that installs the course."""
+    import nbformat
+
+    notebook = read_notebook(path) if notebook is None else notebook
+    if path.resolve().parent == NOTEBOOKS:
+        hosted.insert_install_cell(notebook)
+    return f"{nbformat.writes(notebook)}\n".encode()
 
 
 def with_solutions(notebook: Any) -> Any:
@@ -92,8 +110,6 @@ def write_solutions(folder: Path, sources: Sequence[Path] = ()) -> list[str]:
 
 def run_and_store(path: Path) -> None:
     """Run a lesson and store its printed output. Pictures are drawn again by every reader."""
-    import nbformat
-
     notebook = execute_notebook(read_notebook(path), path.parent)
     for cell in notebook.cells:
         if cell.cell_type != "code":
@@ -104,4 +120,4 @@ def run_and_store(path: Path) -> None:
         is_picture = "picture" in cell.metadata.get("tags", [])
         cell.outputs = [] if is_picture else _merged_streams(kept)
     notebook.metadata.pop("widgets", None)
-    write_whole(path, f"{nbformat.writes(notebook)}\n".encode())
+    write_whole(path, lesson_file(path, notebook))

@@ -27,7 +27,7 @@ from floatbase.lessons.publish.workspace import (
 
 _ROOT = NOTEBOOKS.parent
 _INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")
-_FOLDERS = ("floatbase", "assets/meshes")
+_FOLDERS = ("floatbase", "assets/meshes", "assets/models")
 _HUB = ".binder/jupyterhub_config.py"
 _README = """# floatbase
 

@@ -19,6 +19,7 @@ _INSTALLED = Path(__file__).parents[2] / "_notebooks"
 # of the course: inside an installed package, or else at the top of the repository
 NOTEBOOKS = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[3] / "notebooks"
 MY_FOLDER = "my"
+INSTALL_TAG = "install"  # of the cell that installs the course, see `hosted`
 _RECORD_FILE = ".from.json"  # file name -> digest of the text that the learner received last
 # exceptions that such JSON raises
 _NOT_A_NOTEBOOK = (ValueError, LookupError, TypeError, AttributeError)
@@ -123,7 +124,13 @@ def _course_text(source: Path) -> bytes:
     if source.suffix != ".ipynb":
         return source.read_bytes()
     notebook = _without_outputs(json.loads(source.read_bytes()))
+    notebook["cells"] = without_install_cell(notebook["cells"])
     return (json.dumps(notebook, indent=1, ensure_ascii=False, sort_keys=True) + "\n").encode()
+
+
+def without_install_cell(cells: list[Any]) -> list[Any]:
+    """Return the cells of a lesson without the one that installs the course."""
+    return [cell for cell in cells if INSTALL_TAG not in cell["metadata"].get("tags", [])]
 
 
 def _without_outputs(notebook: Any) -> Any:

@@ -40,6 +40,7 @@ SUPERSAMPLING = 2  # pixels drawn per pixel of the image, in each direction
 _ASPECT = 1.7  # width / height
 _SCALE = 0.8  # size of the image / size of the picture in the page
 _COLOURS = 256
+_MAX_TEXT = 110  # characters, as in ipywidgets
 
 
 def render_png(picture: Picture, scene: Scene, height: int) -> bytes:
@@ -71,9 +72,27 @@ def side_by_side(files: Sequence[bytes]) -> bytes:
     return _png_bytes(whole)
 
 
-def with_thumbnail(bundle: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def panel_bundle(panel: Any, *pictures: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return what a notebook stores of a panel with live pictures, with any ipywidgets."""
+    data = {
+        "text/plain": repr(panel)[:_MAX_TEXT],
+        "application/vnd.jupyter.widget-view+json": {
+            "version_major": 2,
+            "version_minor": 0,
+            "model_id": panel.model_id,
+        },
+    }
+    # Colab needs to know where it finds the code of the pictures
+    live = [picture for picture in pictures if hasattr(picture, "thumbnail")]
+    metadata = live[0]._repr_mimebundle_()[1] if live else {}
+    return with_thumbnail((data, metadata), *pictures)
+
+
+def with_thumbnail(
+    bundle: tuple[dict[str, Any], dict[str, Any]], *pictures: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Add an image to a stored widget, for readers that cannot show widgets."""
-    data, metadata = bundle if isinstance(bundle, tuple) else (bundle, {})
+    data, metadata = bundle
     scenes = [picture.value for picture in pictures if not hasattr(picture, "thumbnail")]
     if scenes:
         data = {**data, "text/html": "".join(scenes)}

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-from nbformat.v4 import new_code_cell, new_notebook
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from floatbase._files import write_whole
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.publish import conventions, equations
 from floatbase.lessons.publish.contents import equation_ranges, title_of
+from floatbase.lessons.publish.hosted import colab_address
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import lecture, recall, reference
@@ -125,6 +126,9 @@ def _write_lessons(
     (source / "lessons").mkdir()
     for path, notebook in notebooks.items():
         prepared = prepare_lesson(notebook, pictures, addresses)
+        if colab := colab_address(path):
+            link = f"[Open this lesson in Colab]({colab}) to run it and to change it."
+            prepared.cells.insert(1, new_markdown_cell(link))
         robot = prepared.metadata.pop(METADATA, None)
         if has_live and robot:
             add_robot(prepared, robot)
