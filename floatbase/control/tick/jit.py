@@ -119,11 +119,11 @@ class _Cache(caching.FunctionCache):
         return None
 
 
-# its name before numba 0.62 has an underscore
-_InTreeLocator: Any = getattr(caching, "InTreeCacheLocator", None) or caching._InTreeCacheLocator
+# the name before numba 0.62 has an underscore
+_LOCATOR_NAME = next(name for name in dir(caching) if name.lstrip("_") == "InTreeCacheLocator")
 
 
-class _ReadOnlyLocator(_InTreeLocator):
+class _ReadOnlyLocator(getattr(caching, _LOCATOR_NAME)):  # type: ignore[misc]
     """Place of the code beside the source, which need not be writable."""
 
     def ensure_cache_path(self) -> None:
@@ -133,7 +133,7 @@ class _ReadOnlyLocator(_InTreeLocator):
 class _ReadOnlyCache(_Cache):
     """The same cache if no folder is writable."""
 
-    class _impl_class(caching.CompileResultCacheImpl):  # noqa: N801  numba's name
+    class _impl_class(caching.CompileResultCacheImpl):
         _locator_classes = [_ReadOnlyLocator]  # noqa: RUF012  a list in numba, too
 
 
