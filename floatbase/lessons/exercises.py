@@ -24,6 +24,7 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.lessons import assignment, progress
 from floatbase.lessons.judges import NO_ANSWER, Example, Verdict, array_or_verdict
 
+PRINTED_NUMBER = "printed_number"  # hint of an answer that is right for the lesson's number
 TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
 
@@ -70,7 +71,7 @@ class Exercise:
             return verdict
         printed, own = self.own.amount(self.own.printed), self.own.amount(value)
         text = f"This is right for {printed}, but your number is {own}."
-        return Verdict(False, text, "printed_number")
+        return Verdict(False, text, PRINTED_NUMBER)
 
     def own_number(self, student: str) -> str:
         """Return a student's own number in words, or "" if there is none."""
@@ -133,7 +134,7 @@ def check(name: str, answer: Any) -> Verdict:
         numbers = student if exercise.own else ""
         progress.record_try(name, verdict.right, answer, numbers)
     number = exercise.own_number(student)
-    if verdict.right or not number:
+    if verdict.right or verdict.hint == PRINTED_NUMBER or not number:
         return verdict
     return replace(verdict, text=f"{verdict.text} With your number, {number}.")
 

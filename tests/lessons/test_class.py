@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hints import MASS
+from hints import MASS, right_answer
 
 from floatbase import lessons
 from floatbase.errors import InputError
@@ -172,7 +172,7 @@ def test_an_answer_to_the_printed_number_is_told_the_own_number(learner, capsys)
     [
         ("s7", "s7", "", ("right", "right"), (False, False)),
         ("s7", "s7", "S7", ("right", "right"), (False, False)),
-        ("s7", "", "", ("wrong", "wrong"), (False, False)),
+        ("s7", "", "", ("wrong", "wrong"), (True, True)),
         ("s8", "s8", "s7", ("right", "wrong"), (True, True)),  # of another student
         ("", "", "s7", ("right", "wrong"), (False, True)),  # the numbers in the lesson
         ("", "", "", ("right", "wrong"), (False, True)),
@@ -211,19 +211,6 @@ def test_answers_before_and_after_own_numbers_keep_their_numbers(learner, capsys
 
 
 # hand-ins of a class ------------------------------------------------------------------------------
-
-
-def right_answer(name, student):
-    exercise = EXERCISES[name]
-    judge = exercise.judge
-    if exercise.own and student:
-        value = exercise.own.value(name, student)
-        if name == "03.2":  # the shift of the printed design, scaled
-            start, printed = exercise.placeholder(), right_answer(name, "")
-            return start + (printed - start) * (value - start[2]) / (printed - start)[2]
-        judge = exercise.own.judge(value)
-    examples = [*getattr(judge, "examples", tuple)(), *exercise.examples()]
-    return next(answer for answer, hint in examples if not hint)
 
 
 KINDS = ("right", "partial", "late", "forged", "malformed", "few")

@@ -25,7 +25,7 @@ from tqdm import tqdm
 from floatbase._files import write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.exercises import Exercise, all_exercises, folded
+from floatbase.lessons.exercises import PRINTED_NUMBER, Exercise, all_exercises, folded
 from floatbase.lessons.predictions import aligned
 from floatbase.lessons.submission import FILE_FORMAT
 
@@ -47,6 +47,7 @@ class ExerciseResult:
     result: str = _NOT_TRIED
     feedback: str = ""
     numbers: str = ""  # id of the student whose numbers the answer uses
+    hint: str = ""
 
     @property
     def lesson(self) -> str:
@@ -169,7 +170,7 @@ def _exercise_result(exercise: Exercise, entry: Any, required: str | None) -> Ex
         text = f"The answer cannot be judged: {_one_line(error)}"
         return ExerciseResult(name, tries, "wrong", text, numbers)
     result = "right" if verdict.right else "wrong"
-    return ExerciseResult(name, tries, result, verdict.text, numbers)
+    return ExerciseResult(name, tries, result, verdict.text, numbers, verdict.hint)
 
 
 def _one_line(value: Any) -> str:
@@ -271,17 +272,22 @@ def join_files(files: Collection[Submission]) -> tuple[Submission, list[str]]:
 
 
 def number_messages(submissions: Sequence[Submission], own_numbers: bool) -> list[str]:
-    """Return messages about answers that do not use the numbers of their file's id.
+    """Return messages about answers with the lesson's number or with numbers of another id.
 
-    With `own_numbers`, these are the wrong ones. Otherwise, these are the ones with numbers of
-    another id.
+    Unless `own_numbers` are required, an answer may use the lesson's number if its file says so.
     """
     messages = []
     for one in submissions:
+        messages += [
+            f"{one.file}: {mark.exercise}: {mark.feedback}"
+            for mark in one.results
+            if mark.hint == PRINTED_NUMBER
+        ]
         found = [
             mark.exercise
             for mark in one.results
-            if all_exercises()[mark.exercise].own
+            if mark.hint != PRINTED_NUMBER
+            and all_exercises()[mark.exercise].own
             and (not one.id or folded(mark.numbers) != folded(one.id))
             and (mark.result == "wrong" if own_numbers else mark.numbers)
         ]
