@@ -204,11 +204,12 @@ def write_gradescope_results(
             lines.append(str(error))
     if not graded and not lines:
         lines.append("No file was submitted.")
-    if len({one.student for one in graded}) > 1:
+    students, has_results = {one.student for one in graded}, any(one.results for one in graded)
+    if len(students) > 1:
         lines.append("The files are of different students. Submit files with your id only.")
-    elif graded and not any(one.results for one in graded):
+    elif graded and not has_results:
         lines.append(f"Hand in lesson {' or '.join(policy.lessons)}. Your files do not contain it.")
-    if len({one.student for one in graded if one.results}) != 1:
+    if len(students) != 1 or not has_results:
         found: dict[str, Any] = {"score": 0, "output": "\n".join(lines)}
     else:
         one, more = join_files(graded)
