@@ -26,3 +26,17 @@ ODD = {
     "huge": np.full(12, 1e300), "complex": np.full(12, 1j), "empty": [], "function": abs,
     "pair": ("a", "b"),
 }  # fmt: skip
+
+
+def right_answer(name, student=""):
+    """A right answer to an exercise, with a student's own numbers or the printed ones."""
+    exercise = all_exercises()[name]
+    judge = exercise.judge
+    if exercise.own and student:
+        value = exercise.own.value(name, student)
+        if name == "03.2":  # the shift of the printed design, scaled
+            start, printed = exercise.placeholder(), right_answer(name, "")
+            return start + (printed - start) * (value - start[2]) / (printed - start)[2]
+        judge = exercise.own.judge(value)
+    examples = [*getattr(judge, "examples", tuple)(), *exercise.examples()]
+    return next(answer for answer, hint in examples if not hint)

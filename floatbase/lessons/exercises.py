@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pkgutil
+import unicodedata
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -23,6 +24,7 @@ from floatbase.errors import InputError, unknown_name
 from floatbase.lessons import assignment, progress
 from floatbase.lessons.judges import NO_ANSWER, Example, Verdict, array_or_verdict
 
+PRINTED_NUMBER = "printed_number"  # hint of an answer that is right for the lesson's number
 TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 
 
@@ -30,14 +32,20 @@ TRIES_BEFORE_REVEAL = 2  # tries before `reveal` shows a solution
 class OwnNumber:
     """Number in an exercise that can differ from student to student."""
 
-    text: str
+    quantity: str  # such as "the acceleration"
+    unit: str
+    printed: float  # the number in the lesson
     values: Sequence[float]
     judge: Callable[[float], Callable[[Any], Verdict]]
 
     def value(self, exercise: str, student: str) -> float:
         """Return the number of a student, which is always the same on every machine."""
-        digest = hashlib.sha256(f"{exercise} {student}".encode()).digest()
+        digest = hashlib.sha256(f"{exercise} {folded(student)}".encode()).digest()
         return self.values[int.from_bytes(digest[:4]) % len(self.values)]
+
+    def amount(self, value: float) -> str:
+        """Write a number with its unit."""
+        return f"{value:g} {self.unit}".strip()
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +61,23 @@ class Exercise:
     examples: Callable[[], Iterable[Example]] = tuple
     own: OwnNumber | None = None
 
-    def judge_for(self, student: str) -> Callable[[Any], Verdict]:
-        """Return the judge for a student's own number; without a student, `judge`."""
+    def verdict_on(self, answer: Any, student: str) -> Verdict:
+        """Judge an answer by a student's own number; without a student, by the printed number."""
         if self.own is None or not student:
-            return self.judge
-        return self.own.judge(self.own.value(self.name, student))
+            return self.judge(answer)
+        value = self.own.value(self.name, student)
+        verdict = self.own.judge(value)(answer)
+        if verdict.right or not self.judge(answer).right:
+            return verdict
+        printed, own = self.own.amount(self.own.printed), self.own.amount(value)
+        text = f"This is right for {printed}, but your number is {own}."
+        return Verdict(False, text, PRINTED_NUMBER)
+
+    def own_number(self, student: str) -> str:
+        """Return a student's own number in words, or "" if there is none."""
+        if self.own is None or not student:
+            return ""
+        return f"{self.own.quantity} is {self.own.amount(self.own.value(self.name, student))}"
 
     def placeholder(self) -> Any:
         """Return the answer in the stub: its variable, or a tuple if it has several."""
@@ -104,12 +124,19 @@ def check(name: str, answer: Any) -> Verdict:
     UnknownNameError
         If there is no such exercise.
     """
-    exercise = _find_exercise(name)
-    verdict = exercise.judge_for(progress.student())(answer)
+    exercise, student = _find_exercise(name), progress.student()
+    verdict = exercise.verdict_on(answer, student)
     if answer is None or answer is Ellipsis or _is_placeholder(answer, exercise.placeholder()):
-        return replace(NO_ANSWER if verdict.hint.startswith("unknown") else verdict, is_try=False)
-    progress.record_try(name, verdict.right, answer)
-    return verdict
+        if verdict.hint.startswith("unknown"):
+            verdict = NO_ANSWER
+        verdict = replace(verdict, is_try=False)
+    else:
+        numbers = student if exercise.own else ""
+        progress.record_try(name, verdict.right, answer, numbers)
+    number = exercise.own_number(student)
+    if verdict.right or verdict.hint == PRINTED_NUMBER or not number:
+        return verdict
+    return replace(verdict, text=f"{verdict.text} With your number, {number}.")
 
 
 def reveal(name: str) -> None:
@@ -141,6 +168,8 @@ def reveal(name: str) -> None:
         print(assignment.where_solutions_are(name))
         return
     print(exercise.solution)
+    if number := exercise.own_number(progress.student()):
+        print(f"\nThis is the solution with the number in the lesson. With yours, {number}.")
     if exercise.explanation:
         print(f"\n{exercise.explanation}")
 
@@ -153,7 +182,7 @@ def own_numbers(student: str) -> None:
     Parameters
     ----------
     student : str
-        Your id in the class, such as "s123456".
+        Your id in the class, such as "s123456". Upper and lower case are the same.
 
     Raises
     ------
@@ -164,8 +193,8 @@ def own_numbers(student: str) -> None:
     progress.append(progress.STUDENT, {"id": student})
     print(f"Numbers of {student}:")
     for name, exercise in all_exercises().items():
-        if exercise.own:
-            print(f"{name}: {exercise.own.text.format(exercise.own.value(name, student))}")
+        if number := exercise.own_number(student):
+            print(f"{name}: {number}.")
 
 
 def student_id(given: Any) -> str:
@@ -174,6 +203,11 @@ def student_id(given: Any) -> str:
     if not text or not text.isprintable() or len(text) > 80:
         raise InputError('id must be your id in the class, such as "s123456".')
     return text
+
+
+def folded(name: str) -> str:
+    """Return a name or an id in a form that ignores upper case, spaces and the kind of accents."""
+    return " ".join(unicodedata.normalize("NFKC", name).casefold().split())
 
 
 def show_progress() -> None:

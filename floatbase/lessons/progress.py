@@ -66,7 +66,7 @@ def load() -> dict[str, dict[str, int]]:
     return tried
 
 
-def record_try(name: str, right: bool, answer: Any = None) -> None:
+def record_try(name: str, right: bool, answer: Any = None, numbers: str = "") -> None:
     """Record a try of an exercise; see `append`.
 
     Parameters
@@ -78,8 +78,11 @@ def record_try(name: str, right: bool, answer: Any = None) -> None:
     answer : object, optional
         The answer. Numbers and names are stored as they are, a function as its source code, which
         is never run.
+    numbers : str, optional
+        Id of the student whose numbers were used; "" for the numbers in the lesson.
     """
-    append(name, {"tries": 1, "right": int(right), "answer": as_json(answer)})
+    entry = {"tries": 1, "right": int(right), "answer": as_json(answer)}
+    append(name, entry | ({"numbers": numbers} if numbers else {}))
 
 
 def answers() -> dict[str, Any]:
@@ -90,14 +93,29 @@ def answers() -> dict[str, Any]:
     dict of str to object
         For each exercise that was tried: the answer in the form of `as_json`.
     """
-    found: dict[str, Any] = {}
-    solved = set()
+    return {name: entry["answer"] for name, entry in _kept_tries().items()}
+
+
+def numbers() -> dict[str, str]:
+    """Return whose numbers each of the `answers` uses.
+
+    Returns
+    -------
+    dict of str to str
+        For each exercise that was tried: the id of a student, or "" for the numbers in the lesson.
+    """
+    kept = {name: str(entry.get("numbers", "")) for name, entry in _kept_tries().items()}
+    return {name: student if student.isprintable() else "" for name, student in kept.items()}
+
+
+def _kept_tries() -> dict[str, dict[str, Any]]:
+    """Return the last right try of each exercise, or the last try if none was right."""
+    found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            right = entry.get("right") == 1
-            if "answer" in entry and (right or name not in solved):
-                found[name] = entry["answer"]
-                solved |= {name} if right else set()
+            was_right = found.get(name, {}).get("right") == 1
+            if "answer" in entry and (entry.get("right") == 1 or not was_right):
+                found[name] = entry
     return found
 
 

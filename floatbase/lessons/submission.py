@@ -13,7 +13,7 @@ from floatbase._files import read_file, write_whole
 from floatbase._validation import as_string, short_repr
 from floatbase.errors import InputError
 from floatbase.lessons import inventory, progress
-from floatbase.lessons.exercises import all_exercises, student_id
+from floatbase.lessons.exercises import all_exercises, folded, student_id
 from floatbase.lessons.predictions import lesson_name
 from floatbase.lessons.questions import all_questions
 
@@ -67,7 +67,11 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
             f"There is nothing to hand in yet: {progress.path()} contains no answers and no "
             f"predictions{f' in lesson {lesson}' if lesson else ''}. {progress.storage_problem()}"
         )
-    exercises = {key: {**entry, "answer": answers.get(key)} for key, entry in tried.items()}
+    numbers = progress.numbers()
+    exercises = {
+        key: {**entry, "answer": answers.get(key), "numbers": numbers.get(key, "")}
+        for key, entry in tried.items()
+    }
     written = {
         "form": FILE_FORMAT, "name": name.strip(), "id": student, "lesson": lesson,
         "floatbase": fb.__version__,
@@ -95,6 +99,13 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
         print(
             f"An older version of floatbase did not save your answers to {', '.join(lost)}. Check "
             f"them once more, then hand in again."
+        )
+    personal = [key for key in tried if key in known and known[key].own]
+    others = [key for key in personal if folded(numbers.get(key, "")) != folded(student)]
+    if others and (progress.student() or any(numbers.values())):
+        print(
+            f"{', '.join(others)}: your answers do not use the numbers of {student}. If your "
+            f'teacher requires them, run own_numbers("{student}") and check these answers again.'
         )
     return path
 

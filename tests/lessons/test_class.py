@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hints import MASS
+from hints import MASS, right_answer
 
 from floatbase import lessons
 from floatbase.errors import InputError
-from floatbase.lessons import all_exercises, check, hand_in, own_numbers, progress
+from floatbase.lessons import all_exercises, check, hand_in, own_numbers, progress, reveal
 from floatbase.lessons.publish import gradebook, grades, package
 from floatbase.lessons.publish.__main__ import main
 
@@ -129,7 +129,8 @@ def test_personal_numbers_have_their_own_right_answers(name):
         examples = [*getattr(judge, "examples", tuple)()]
         assert all(judge(answer).hint == hint for answer, hint in examples)
         assert not any(judge(answer).right for answer in standard)
-        assert str(value) in exercise.own.text.format(value)
+        assert str(value).removesuffix(".0") in exercise.own.amount(value)
+    assert all(exercise.own.judge(exercise.own.printed)(answer).right for answer in standard)
 
 
 def test_a_student_always_gets_the_same_numbers(capsys):
@@ -141,7 +142,6 @@ def test_a_student_always_gets_the_same_numbers(capsys):
     printed = capsys.readouterr().out
     assert [line.split(":")[0] for line in printed.splitlines()[1:]] == OWN
     assert f"{values['7']} m/s²" in printed
-    assert not check("00.1", MASS * (9.81 + 2.0)).right
     assert check("00.1", MASS * (9.81 + values["7"])).right
     for wrong in ("", "a\nb", "a" * 81, 5):
         with pytest.raises(InputError, match="id"):
@@ -149,28 +149,68 @@ def test_a_student_always_gets_the_same_numbers(capsys):
     assert progress.student() == "7"
 
 
-def test_grading_uses_the_numbers_of_the_id(learner):
+def test_an_answer_to_the_printed_number_is_told_the_own_number(learner, capsys):
+    for name in OWN:
+        own, printed = EXERCISES[name].own, right_answer(name, "")
+        assert check(name, printed).right
+        own_numbers("S7 ")
+        numbers = [own.amount(number) for number in (own.printed, own.value(name, "s7"))]
+        capsys.readouterr()
+        for verdict in (check(name, printed), check(name, right_answer(name, "s8"))):
+            assert not verdict.right and numbers[1] in verdict.text
+        assert all(number in check(name, printed).text for number in numbers)
+        placeholder = check(name, EXERCISES[name].placeholder())
+        assert numbers[1] in placeholder.text and not placeholder.is_try
+        reveal(name)
+        assert numbers[1] in capsys.readouterr().out
+        assert check(name, right_answer(name, "s7")).right
+        progress.path().unlink()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "of", "id", "results", "told"),  # without and with --own-numbers
+    [
+        ("s7", "s7", "", ("right", "right"), (False, False)),
+        ("s7", "s7", "S7", ("right", "right"), (False, False)),
+        ("s7", "", "", ("wrong", "wrong"), (True, True)),
+        ("s8", "s8", "s7", ("right", "wrong"), (True, True)),  # of another student
+        ("", "", "s7", ("right", "wrong"), (False, True)),  # the numbers in the lesson
+        ("", "", "", ("right", "wrong"), (False, True)),
+    ],
+)
+def test_each_answer_is_graded_by_the_numbers_that_it_uses(
+    learner, capsys, numbers, of, id, results, told
+):
+    if numbers:
+        own_numbers(numbers)
+    for name in OWN:
+        check(name, right_answer(name, of))
+    path = hand_in("Ada", id=id)
+    for required in (False, True):
+        capsys.readouterr()
+        main(["grade", str(path), "--table", "marks.csv", *["--own-numbers"] * required])
+        printed = capsys.readouterr().out
+        rows = list(csv.DictReader((learner / "marks.csv").open(encoding="utf-8")))
+        assert {row["result"] for row in rows if row["exercise"] in OWN} == {results[required]}
+        assert {name in printed for name in OWN} == {told[required]}
+
+
+def test_answers_before_and_after_own_numbers_keep_their_numbers(learner, capsys):
+    check("00.1", right_answer("00.1", ""))
+    check("01.1", right_answer("01.1", ""))
     own_numbers("s7")
-    own = EXERCISES["00.1"].own
-    check("00.1", MASS * (9.81 + own.value("00.1", "s7")))
-    path = hand_in("Ada", lesson="0")
-    assert path.name == "answers-Ada-lesson00.json"
-    for numbers, result in ((True, "right"), (False, "wrong")):
-        graded = grades.grade_file(path, own_numbers=numbers)
-        assert graded.id == "s7"
-        assert {r.result for r in graded.results if r.exercise == "00.1"} == {result}
+    check("06.2", right_answer("06.2", "s7"))
+    path = hand_in("Ada")
+    said = capsys.readouterr().out
+    assert "00.1: your answers do not use the numbers of s7" in said
+    assert grades.grade_file(path).right == {"00.1", "01.1", "06.2"}
+    assert grades.grade_file(path, own_numbers=True).right == {"01.1", "06.2"}
     with pytest.raises(InputError, match="lesson 05"):
         hand_in("Ada", lesson="5")
+    assert hand_in("Ada", lesson="0").name == "answers-Ada-lesson00.json"
 
 
 # hand-ins of a class ------------------------------------------------------------------------------
-
-
-def right_answer(name, student):
-    exercise = EXERCISES[name]
-    judge = exercise.judge_for(student)
-    examples = [*getattr(judge, "examples", tuple)(), *exercise.examples()]
-    return next(answer for answer, hint in examples if not hint)
 
 
 KINDS = ("right", "partial", "late", "forged", "malformed", "few")

@@ -71,6 +71,6 @@ EXERCISES = (
         examples=lambda: [(_go2().mass * (9.8 + UP), "")],
         explanation="By Newton's law, the vertical forces of the ground minus the weight equal "
         "mass times acceleration. So their sum is m g + m a.",
-        own=OwnNumber("the acceleration is {} m/s².", (1.2, 1.4, 1.6, 2.4, 2.6, 2.8), _judge),
+        own=OwnNumber("the acceleration", "m/s²", UP, (1.2, 1.4, 1.6, 2.4, 2.6, 2.8), _judge),
     ),
 )

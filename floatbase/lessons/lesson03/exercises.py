@@ -279,7 +279,9 @@ EXERCISES = (
         examples=unloading_examples,
         explanation="Every λ = λ₀ + N x keeps the robot still. x is the shortest vector with "
         "row x = 20 - λ₀[2].",
-        own=OwnNumber("FL carries {} N.", (16.0, 18.0, 22.0, 24.0, 26.0, 28.0), unloading_judge),
+        own=OwnNumber(
+            "the force on FL", "N", 20.0, (16.0, 18.0, 22.0, 24.0, 26.0, 28.0), unloading_judge
+        ),
     ),
     Exercise(
         name="03.3",

@@ -273,7 +273,7 @@ EXERCISES = (
         judge=_slope_judge(),
         explanation="α_∥ / α_⊥ of a vertical force is the tangent of the slope, and the middle "
         "of a facet allows μ cos(π/8).",
-        own=OwnNumber("μ = {}.", (0.4, 0.45, 0.5, 0.55, 0.6, 0.65), _slope_judge),
+        own=OwnNumber("μ", "", MU, (0.4, 0.45, 0.5, 0.55, 0.6, 0.65), _slope_judge),
     ),
     Exercise(
         name="06.3",

@@ -225,7 +225,7 @@ EXERCISES = (
         explanation="All corners have the same lever arm. So the result is μ f_z times the "
         "distance, however they share the load.",
         own=OwnNumber(
-            "the sole is pressed with {} N.", (320.0, 360.0, 440.0, 480.0, 520.0), _twist_judge
+            "the force on the sole", "N", LOAD, (320.0, 360.0, 440.0, 480.0, 520.0), _twist_judge
         ),
     ),
     Exercise(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -169,16 +169,17 @@ def _add_grade(commands: Any) -> None:
     add("--table", type=Path, metavar="CSV", help=text)
     add("--inventory", action="store_true", help="print the gain in the concept inventory")
     add("--code", action="store_true", help="print the code that was handed in")
-    add("--latest", action="store_true", help="grade only the last file of each learner")
+    text = "join the files of each learner: in each lesson, the last one counts"
+    add("--latest", action="store_true", help=text)
     text = "leave out files written after TIME, such as 2026-05-31T18:00"
     add("--before", type=_local_time, metavar="TIME", help=text)
-    text = "lessons that give points"
+    text = "grade these lessons only"
     add("--lessons", nargs="+", default=[], metavar="LESSON", help=text)
-    text = "judge by the numbers of each student's id"
+    text = "require the numbers of each student's id"
     add("--own-numbers", action="store_true", help=text)
     add("--due", type=_local_time, metavar="TIME", help="when answers are due")
     text = "days on which late files still count"
-    add("--late-days", type=int, default=0, metavar="N", help=text)
+    add("--late-days", type=_whole_number, default=0, metavar="N", help=text)
     text = "write points as CSV to --table"
     add("--gradebook", choices=("canvas", "moodle"), help=text)
     text = "the class, as the gradebook exports it"
@@ -218,10 +219,18 @@ def _grade(given: Namespace) -> int:
         return 0
     if given.gradebook and not (given.roster and given.table):
         raise InputError("--gradebook needs --roster CSV and --table CSV.")
+    if (given.due or given.late_days) and not given.gradebook:
+        raise InputError("--due and --late-days need --gradebook, --gradescope or --results.")
     submissions, unread = grades.grade_files(
-        given.files, latest=given.latest, before=given.before, own_numbers=given.own_numbers
+        given.files,
+        latest=given.latest,
+        before=given.before,
+        lessons=policy.lessons,
+        own_numbers=given.own_numbers,
     )
     print(grades.overview(submissions))
+    for line in grades.number_messages(submissions, given.own_numbers):
+        print(line)
     if given.code:
         print(grades.code_to_read(submissions))
     if given.inventory:
@@ -305,8 +314,16 @@ def _add_folder(parser: ArgumentParser, text: str | None = None, **options: Any)
     parser.add_argument("--to", type=Path, metavar="FOLDER", help=text, **options)
 
 
+def _whole_number(text: str) -> int:
+    if not text.isdecimal():
+        raise ArgumentTypeError(f"{text!r} is not a whole number of at least 0.")
+    return int(text)
+
+
 def _local_time(text: str) -> datetime:
     """Read a time in ISO format, local unless it says otherwise."""
+    if text and not set("T ") & set(text):  # a date alone would mean the start of that day
+        raise ArgumentTypeError(f"{text!r} has no time of day. Write it as in 2026-05-31T18:00.")
     try:
         return datetime.fromisoformat(text).astimezone()
     except OverflowError as error:

@@ -7,22 +7,25 @@ import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import datetime, timedelta
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
 
 from floatbase._files import read_file, write_whole
 from floatbase.errors import InputError
-from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.exercises import all_exercises, folded
 from floatbase.lessons.predictions import lesson_name
 from floatbase.lessons.publish.grades import (
     ExerciseResult,
     Submission,
-    csv_safe,
+    exercises_of,
     grade_file,
+    join_files,
+    last_files,
+    lesson_of,
     time_of,
-    time_order,
+    write_csv,
 )
 
 _DAY = timedelta(days=1)
@@ -45,18 +48,7 @@ class Policy:
     lessons: tuple[str, ...] = ()
     due: datetime | None = None
     late_days: int = 0
-
-    def results(self, submission: Submission) -> list[ExerciseResult]:
-        """Return the results of the exercises that count."""
-        return [
-            result
-            for result in submission.results
-            if not self.lessons or result.exercise.split(".")[0] in self.lessons
-        ]
-
-    def points(self, submission: Submission) -> int:
-        """Return the points of a file: one for each right exercise."""
-        return sum(result.result == "right" for result in self.results(submission))
+    late_due: datetime | None = None  # files count until then, too
 
     def days_late(self, time: datetime | None) -> int:
         """Return the started days after the due date, or a day too many if the time is unknown."""
@@ -68,12 +60,14 @@ class Policy:
 
     def is_too_late(self, time: datetime | None) -> bool:
         """Return whether a file of that time no longer counts."""
+        if time and self.late_due and time <= self.late_due:
+            return False
         return self.days_late(time) > self.late_days
 
 
 def lessons_with_exercises(names: Sequence[str]) -> tuple[str, ...]:
     """Return the lessons of these names, such as "01", "1" or "c"."""
-    known = {name.split(".")[0] for name in all_exercises()}
+    known = {*map(lesson_of, all_exercises())}
     found = tuple(map(lesson_name, names))
     if unknown := [name for name in found if name not in known]:
         raise InputError(
@@ -92,48 +86,54 @@ def write_gradebook(
     column: str,
     policy: Policy,
 ) -> list[str]:
-    """Write a CSV file that Canvas or Moodle imports."""
+    """Write a CSV file that Canvas or Moodle imports; return messages for the teacher.
+
+    The submissions hold the results of the policy's lessons only.
+    """
     header, rows = _read_roster(kind, roster)
+    if table.exists() and table.samefile(roster):
+        raise InputError(f"{table} is the roster, so it is not replaced. Give another --table CSV.")
     kept = [name for name in _COLUMNS[kind] if name in header]
     full = next((name for name in header if _is_column(name, column)), column)
-    students = [row for row in rows if not _is_points_row(row)]
-    chosen: dict[int, Submission] = {}
+    files_of: dict[int, list[Submission]] = {}
     messages = []
-    for one in sorted(submissions, key=time_order):
-        found = [i for i, row in enumerate(students) if _matches(kind, row, one)]
-        if len(found) != 1:
+    for one in submissions:
+        found = [
+            i for i, row in enumerate(rows) if not _is_points_row(row) and _matches(kind, row, one)
+        ]
+        if len(found) == 1:
+            files_of.setdefault(found[0], []).append(one)
+        else:
             many = "more than one student" if found else "nobody"
             messages.append(f"{one.file}: {one.name} {one.id} matches {many} in {roster.name}.")
-        elif policy.is_too_late(time_of(one.time)):
-            messages.append(f"{one.file}: too late, written {one.time}.")
+    written = []
+    for i, row in enumerate(rows):
+        if _is_points_row(row):
+            points: int | None = len(exercises_of(policy.lessons))
         else:
-            if found[0] in chosen and chosen[found[0]].name != one.name:
-                messages.append(f"{one.file}: another name for the id of {chosen[found[0]].file}.")
-            chosen[found[0]] = one
-    total = max((len(policy.results(one)) for one in submissions), default=0)
-    written, number = [], 0
-    for row in rows:
-        points = total
-        if not _is_points_row(row):
-            number += 1
-            if number - 1 not in chosen:
-                continue
-            one = chosen[number - 1]
-            points = policy.points(one)
-            if days := policy.days_late(time_of(one.time)):
-                messages.append(f"{one.file}: late days used: {days}.")
-        written.append([*(row[name] for name in kept), points])
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow([*kept, full])
-    writer.writerows([csv_safe(part) for part in row] for row in written)
-    if table.exists() and table.suffix.lower() != ".csv":
-        raise InputError(f"{table} is not a CSV file, so it is not replaced. Give another file.")
-    try:
-        write_whole(table, text.getvalue().encode(), keep_link=True)
-    except OSError as error:
-        raise InputError(f"{table} cannot be written: {error.strerror}.") from None
+            points, more = _points(files_of.get(i, ()), policy)
+            messages += more
+        if points is not None:
+            written.append([*(row[name] for name in kept), points])
+    write_csv(table, [*kept, full], written)
     return messages
+
+
+def _points(files: Sequence[Submission], policy: Policy) -> tuple[int | None, list[str]]:
+    """Return the points of one student, None without a file that counts, and messages."""
+    messages = [
+        f"{one.file}: too late, written {one.time}."
+        for one in files
+        if one.results and policy.is_too_late(time_of(one.time))
+    ]
+    counted = [one for one in files if one.results and not policy.is_too_late(time_of(one.time))]
+    if not counted:
+        others = ", ".join(one.file for one in files if not one.results)
+        return None, messages or ([f"{others}: of other lessons only."] if others else [])
+    joined, more = join_files(counted)
+    late = {one.file: policy.days_late(time_of(one.time)) for one in last_files(counted).values()}
+    messages += [f"{file}: late days used: {days}." for file, days in late.items() if days]
+    return len(joined.right), messages + more
 
 
 def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]]:
@@ -175,16 +175,15 @@ def _is_column(name: str, column: str) -> bool:
 
 def _matches(kind: str, row: Mapping[str, str], submission: Submission) -> bool:
     if submission.id:
-        ids = {row.get(name, "").strip().casefold() for name in _IDS[kind]} - {""}
-        return submission.id.casefold() in ids
-    wanted = submission.name.casefold().split()
-    last, _, first = row.get("Student", "").partition(",")
-    names = [
-        f"{first} {last}",
-        f"{row.get('First name', '')} {row.get('Last name', '')}",
-        f"{row.get('FirstName', '')} {row.get('LastName', '')}",
-    ]
-    return bool(wanted) and wanted in [name.casefold().split() for name in names]
+        names = [row.get(name, "") for name in _IDS[kind]]
+    else:
+        last, _, first = row.get("Student", "").partition(",")
+        names = [
+            f"{first} {last}",
+            f"{row.get('First name', '')} {row.get('Last name', '')}",
+            f"{row.get('FirstName', '')} {row.get('LastName', '')}",
+        ]
+    return submission.student in {folded(name) for name in names} - {""}
 
 
 def write_gradescope_results(
@@ -196,22 +195,28 @@ def write_gradescope_results(
     own_numbers: bool = False,
 ) -> None:
     """Grade what one student submitted to Gradescope, and write its results.json."""
-    policy = policy or Policy()
     known = _read_metadata(metadata)
-    due = time_of(str(known["assignment"].get("due_date"))) if known else policy.due
-    policy = Policy(policy.lessons, due, policy.late_days)
-    graded, errors = [], []
+    created, policy = _with_dates(policy or Policy(), known)
+    graded, lines = [], []
     for path in files:
         try:
-            graded.append(grade_file(path, own_numbers=own_numbers))
+            graded.append(grade_file(path, lessons=policy.lessons, own_numbers=own_numbers))
         except InputError as error:
-            errors.append(str(error))
-    if len(graded) != 1:
-        wrong = "\n".join(errors) if not graded else "Submit one file of hand_in(…) only."
-        found: dict[str, Any] = {"score": 0, "output": wrong or "No file was submitted."}
+            lines.append(str(error))
+    if not graded and not lines:
+        lines.append("No file was submitted.")
+    students, has_results = {one.student for one in graded}, any(one.results for one in graded)
+    if len(students) > 1:
+        lines.append("The files are of different students. Submit files with your id only.")
+    elif graded and not has_results:
+        lines.append(f"Hand in lesson {' or '.join(policy.lessons)}. Your files do not contain it.")
+    if len(students) != 1 or not has_results:
+        found: dict[str, Any] = {"score": 0, "output": "\n".join(lines)}
     else:
-        (one,) = graded
-        time = time_of(str(known.get("created_at"))) if known else time_of(one.time)
+        one, more = join_files(graded)
+        lines += more
+        results = {result.exercise: result for result in one.results}
+        time = created or time_of(one.time)
         late = policy.is_too_late(time)
         tests = [
             {
@@ -222,7 +227,9 @@ def write_gradescope_results(
                 "output": _comment(result),
                 "visibility": "visible",
             }
-            for result in policy.results(one)
+            for result in (
+                results.get(name, ExerciseResult(name)) for name in exercises_of(policy.lessons)
+            )
         ]
         days = policy.days_late(time)
         told = f" Late days used: {days}." if days else ""
@@ -235,7 +242,7 @@ def write_gradescope_results(
             )
         found = {
             "score": sum(test["score"] for test in tests if isinstance(test["score"], int)),
-            "output": f"{one.name}.{told}",
+            "output": "\n".join([f"{one.name}.{told}", *lines]),
             "tests": [*tests, *_identity(one, known)],
             "extra_data": {"late_days": days, "predictions": one.predicted},
         }
@@ -255,19 +262,54 @@ def _read_metadata(path: Path | None) -> dict[str, Any]:
         found = json.loads(read_file(path)) if path else None
     except (OSError, ValueError, RecursionError):
         found = None
-    is_usable = isinstance(found, dict) and isinstance(found.get("assignment"), dict)
-    return found if isinstance(found, dict) and is_usable else {}
+    return _as_dict(found)
+
+
+def _as_dict(value: Any) -> dict[str, Any]:
+    """Return a dict as it is, and anything else as {}: metadata may lack any part."""
+    return value if isinstance(value, dict) else {}
+
+
+def _users(metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
+    users = metadata.get("users")
+    return [user for user in users if isinstance(user, dict)] if isinstance(users, list) else []
+
+
+def _with_dates(policy: Policy, metadata: Mapping[str, Any]) -> tuple[datetime | None, Policy]:
+    """Return when files were submitted, and the policy with the dates of their students.
+
+    A student's own date comes before the date of the class, and this one before that of the policy.
+    A group has the latest date of its students. A date without a zone has the zone of the others.
+    """
+    class_dates = _as_dict(metadata.get("assignment"))
+    own_dates = [_as_dict(user.get("assignment")) for user in _users(metadata)] or [{}]
+    keys = ("due_date", "late_due_date")
+    given = [str(metadata.get("created_at"))]
+    given += [str(dates.get(key)) for dates in (class_dates, *own_dates) for key in keys]
+    zone = next((found for found in map(_zone, given) if found), None)
+
+    def latest(key: str, default: datetime | None) -> datetime | None:
+        of_class = time_of(str(class_dates.get(key)), zone) or default
+        of_students = [time_of(str(dates.get(key)), zone) or of_class for dates in own_dates]
+        return max((date for date in of_students if date), default=None)
+
+    due, late_due = latest("due_date", policy.due), latest("late_due_date", policy.late_due)
+    return time_of(given[0], zone), replace(policy, due=due, late_due=late_due)
+
+
+def _zone(text: str) -> tzinfo | None:
+    try:
+        return datetime.fromisoformat(text).tzinfo
+    except ValueError:
+        return None
 
 
 def _identity(submission: Submission, metadata: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Tell the teacher alone if a file's id or name is not that of the student who submitted it."""
-    users = [user for user in metadata.get("users", ()) if isinstance(user, dict)]
-    if not users:
-        return []
-    given = (submission.id or submission.name).casefold()
-    ids = [str(user.get(key)).casefold() for user in users for key in ("sid", "email", "name")]
-    ids += [name.partition("@")[0] for name in ids if "@" in name]
-    if given in ids:
+    keys = ("sid", "email", "name")
+    ids = [str(user[key]) for user in _users(metadata) for key in keys if user.get(key)]
+    local_parts = [name.partition("@")[0] for name in ids if "@" in name]
+    if not ids or submission.student in map(folded, [*ids, *local_parts]):
         return []
     text = f"The file is of {submission.name} {submission.id}, and {ids[-1]} submitted it."
     return [
@@ -305,6 +347,7 @@ def write_autograder(folder: Path, *, policy: Policy, own_numbers: bool = False)
     from floatbase.lessons.publish.package import package_copy
 
     options = [f"--late-days {policy.late_days}"]
+    options += [f"--due {policy.due.isoformat()}"] if policy.due else []
     options += [f"--lessons {' '.join(policy.lessons)}"] if policy.lessons else []
     options += ["--own-numbers"] if own_numbers else []
     scripts = {"setup.sh": _SETUP, "run_autograder": _RUN.format(options=" ".join(options))}

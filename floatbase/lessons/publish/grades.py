@@ -10,9 +10,9 @@ import io
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, tzinfo
 from pathlib import Path
 from textwrap import indent
 from typing import Any
@@ -23,7 +23,7 @@ from tqdm import tqdm
 from floatbase._files import read_file, write_whole
 from floatbase.errors import InputError
 from floatbase.lessons import progress
-from floatbase.lessons.exercises import all_exercises
+from floatbase.lessons.exercises import PRINTED_NUMBER, Exercise, all_exercises, folded
 from floatbase.lessons.predictions import aligned
 from floatbase.lessons.submission import FILE_FORMAT
 
@@ -44,32 +44,81 @@ class ExerciseResult:
     tries: int = 0
     result: str = _NOT_TRIED
     feedback: str = ""
+    numbers: str = ""  # id of the student whose numbers the answer uses
+    hint: str = ""
+
+    @property
+    def lesson(self) -> str:
+        """Name of the lesson."""
+        return lesson_of(self.exercise)
 
 
 @dataclass(frozen=True)
 class Submission:
-    """Grades of one file of `hand_in`."""
+    """Grades of one file of `hand_in`, or of several files of one student."""
 
     file: str
     name: str
     id: str
     time: str
-    results: tuple[ExerciseResult, ...]
-    predicted: int
+    results: tuple[ExerciseResult, ...]  # of the lessons that were handed in
+    predictions: frozenset[str]
     inventory: dict[str, Any]
 
+    @property
+    def student(self) -> str:
+        """Who handed in: the id, or the name if there is no id."""
+        return folded(self.id or self.name)
 
-def grade_file(path: str | Path, *, own_numbers: bool = False) -> Submission:
-    """Judge again every answer of a file that `hand_in` wrote."""
+    @property
+    def predicted(self) -> int:
+        """Number of predictions."""
+        return len(self.predictions)
+
+    @property
+    def right(self) -> set[str]:
+        """Exercises with a right answer."""
+        return {mark.exercise for mark in self.results if mark.result == "right"}
+
+
+def lesson_of(name: str) -> str:
+    """Return the lesson of an exercise."""
+    return name.split(".")[0]
+
+
+def exercises_of(lessons: Collection[str]) -> dict[str, Exercise]:
+    """Return the exercises of some lessons, or of all lessons if `lessons` is empty."""
+    return {
+        name: exercise
+        for name, exercise in all_exercises().items()
+        if not lessons or lesson_of(name) in lessons
+    }
+
+
+def grade_file(
+    path: str | Path, *, lessons: Collection[str] = (), own_numbers: bool = False
+) -> Submission:
+    """Judge again every answer of a file that `hand_in` wrote, in some lessons or in all.
+
+    Each answer is judged by the numbers that it uses. With `own_numbers`, it must use those of the
+    file's id.
+    """
     found = _read(Path(path))
     student = _one_line(found.get("id") or "").strip()
+    lesson = str(found.get("lesson"))
+    is_whole = not exercises_of([lesson])
+    results = [
+        _exercise_result(exercise, found["exercises"].get(name), student if own_numbers else None)
+        for name, exercise in exercises_of(lessons).items()
+        if is_whole or lesson_of(name) == lesson
+    ]
     return Submission(
         file=_one_line(Path(path).name),
         name=_one_line(found["name"]),
         id=student,
         time=_one_line(found.get("time")),
-        results=tuple(_exercise_results(found["exercises"], student if own_numbers else "")),
-        predicted=len(found["predictions"]),
+        results=tuple(results),
+        predictions=frozenset(found["predictions"]),
         inventory=given if isinstance(given := found.get("inventory"), dict) else {},
     )
 
@@ -94,26 +143,28 @@ def _read(path: Path) -> dict[str, Any]:
     return found
 
 
-def _exercise_results(entries: dict[str, Any], student: str) -> Iterator[ExerciseResult]:
-    for name, exercise in all_exercises().items():
-        entry = entries.get(name)
-        entry = entry if isinstance(entry, dict) else {}
-        tries, kept = entry.get("tries"), entry.get("answer")
-        if type(tries) is not int or tries < 1:
-            yield ExerciseResult(name)
-            continue
-        if isinstance(kept, dict) and isinstance(code := kept.get("code"), str):
-            yield ExerciseResult(name, tries, _TO_BE_READ, code)
-            continue
-        try:
-            with np.errstate(all="ignore"):
-                verdict = exercise.judge_for(student)(progress.from_json(kept))
-        # a file may hold anything, and one answer must not end the others' judgement
-        except Exception as error:
-            text = f"The answer cannot be judged: {_one_line(error)}"
-            yield ExerciseResult(name, tries, "wrong", text)
-        else:
-            yield ExerciseResult(name, tries, "right" if verdict.right else "wrong", verdict.text)
+def _exercise_result(exercise: Exercise, entry: Any, required: str | None) -> ExerciseResult:
+    """Judge an entry of a file, by the numbers of the id `required` if it is not None."""
+    name, entry = exercise.name, entry if isinstance(entry, dict) else {}
+    tries, kept = entry.get("tries"), entry.get("answer")
+    numbers = _one_line(entry.get("numbers") or "").strip() if exercise.own else ""
+    if type(tries) is not int or tries < 1:
+        return ExerciseResult(name)
+    if isinstance(kept, dict) and isinstance(code := kept.get("code"), str):
+        return ExerciseResult(name, tries, _TO_BE_READ, code)
+    if exercise.own and required == "":
+        text = "Your teacher requires your own numbers. Run own_numbers(…) and check this again."
+        return ExerciseResult(name, tries, "wrong", text, numbers)
+    try:
+        with np.errstate(all="ignore"):
+            answer = progress.from_json(kept)
+            verdict = exercise.verdict_on(answer, numbers if required is None else required)
+    # a file may hold anything, and one answer must not end the others' judgement
+    except Exception as error:
+        text = f"The answer cannot be judged: {_one_line(error)}"
+        return ExerciseResult(name, tries, "wrong", text, numbers)
+    result = "right" if verdict.right else "wrong"
+    return ExerciseResult(name, tries, result, verdict.text, numbers, verdict.hint)
 
 
 def _one_line(value: Any) -> str:
@@ -126,13 +177,17 @@ def grade_files(
     *,
     latest: bool = False,
     before: datetime | None = None,
+    lessons: Collection[str] = (),
     own_numbers: bool = False,
 ) -> tuple[list[Submission], int]:
-    """Judge files in their order, and report the files that `hand_in` did not write."""
+    """Judge files in their order, and report the files that `hand_in` did not write.
+
+    With `latest`, the files of each learner are joined.
+    """
     submissions, unread = [], 0
     for path in tqdm(files, desc="grading", unit="file", leave=False, disable=None):
         try:
-            submissions.append(grade_file(path, own_numbers=own_numbers))
+            submissions.append(grade_file(path, lessons=lessons, own_numbers=own_numbers))
         except InputError as error:
             print(error, file=sys.stderr)
             unread += 1
@@ -142,8 +197,13 @@ def grade_files(
             one for one, time in zip(submissions, times, strict=True) if time and time <= before
         ]
     if latest:
-        last = {(one.id or one.name): one for one in sorted(submissions, key=time_order)}
-        submissions = [one for one in submissions if last[one.id or one.name] is one]
+        files_of: dict[str, list[Submission]] = {}
+        for one in submissions:
+            files_of.setdefault(one.student, []).append(one)
+        joined = [join_files(some) for some in files_of.values()]
+        submissions = [one for one, _ in joined]
+        for line in (line for _, lines in joined for line in lines):
+            print(line)
     if not submissions:
         raise InputError(
             "There is no file to grade. Name files that learners wrote with hand_in(…)."
@@ -151,10 +211,91 @@ def grade_files(
     return submissions, unread
 
 
-def time_of(text: str) -> datetime | None:
-    """Read a time in ISO format; None if it is no time."""
+def last_files(files: Collection[Submission]) -> dict[str, Submission]:
+    """Return for each lesson the file of one student that counts: the last one with an answer."""
+    found = {}
+    for lesson in sorted({mark.lesson for one in files for mark in one.results}):
+        parts = [
+            (one, [mark.result for mark in one.results if mark.lesson == lesson]) for one in files
+        ]
+        # of files of the same time, the one with more right answers
+        found[lesson], _ = max(
+            ((one, results) for one, results in parts if results),
+            key=lambda part: (
+                set(part[1]) != {_NOT_TRIED}, time_order(part[0]), part[1].count("right")
+            ),
+        )  # fmt: skip
+    return found
+
+
+def join_files(files: Collection[Submission]) -> tuple[Submission, list[str]]:
+    """Join the files of one student, and return messages about files that disagree.
+
+    In each lesson, the last file with an answer counts.
+    """
+    files, counting = sorted(files, key=time_order), last_files(files)
+    last = files[-1]
+    messages = [
+        f"{one.file}: another name for the id of {last.file}."
+        for one in files
+        if folded(one.name) != folded(last.name)
+    ]
+    for lesson, counts in counting.items():
+        for one in files:
+            lost = [name for name in sorted(one.right - counts.right) if lesson_of(name) == lesson]
+            if lost:
+                messages.append(
+                    f"{one.file}: {', '.join(lost)} right, but {counts.file} counts in lesson "
+                    f"{lesson}, because it is newer."
+                )
+    used = [one for one in files if one in counting.values()] or [last]
+    joined = replace(
+        last,
+        file=", ".join(dict.fromkeys(one.file for one in used)),
+        time=used[-1].time,
+        results=tuple(
+            mark
+            for lesson, counts in counting.items()
+            for mark in counts.results
+            if mark.lesson == lesson
+        ),
+        predictions=frozenset().union(*(one.predictions for one in files)),
+        inventory={time: letters for one in files for time, letters in one.inventory.items()},
+    )
+    return joined, messages
+
+
+def number_messages(submissions: Sequence[Submission], own_numbers: bool) -> list[str]:
+    """Return messages about answers with the lesson's number or with numbers of another id.
+
+    Unless `own_numbers` are required, an answer may use the lesson's number if its file says so.
+    """
+    messages = []
+    for one in submissions:
+        messages += [
+            f"{one.file}: {mark.exercise}: {mark.feedback}"
+            for mark in one.results
+            if mark.hint == PRINTED_NUMBER
+        ]
+        found = [
+            mark.exercise
+            for mark in one.results
+            if mark.hint != PRINTED_NUMBER
+            and all_exercises()[mark.exercise].own
+            and (not one.id or folded(mark.numbers) != folded(one.id))
+            and (mark.result == "wrong" if own_numbers else mark.numbers)
+        ]
+        if found:
+            whose = f"those of its id, {one.id}" if one.id else "those of an id"
+            messages.append(f"{one.file}: the numbers in {', '.join(found)} are not {whose}.")
+    return messages
+
+
+def time_of(text: str, zone: tzinfo | None = None) -> datetime | None:
+    """Read a time in ISO format, local or of `zone` unless it says otherwise; None if not one."""
     try:
-        return datetime.fromisoformat(text).astimezone()
+        time = datetime.fromisoformat(text)
+        return time.replace(tzinfo=time.tzinfo or zone).astimezone()
     except (ValueError, OverflowError):  # also local times before year 1 or after 9999
         return None
 
@@ -167,11 +308,11 @@ def time_order(submission: Submission) -> float:
 
 def overview(submissions: Sequence[Submission]) -> str:
     """Write one line per learner: correct exercises per lesson and in total, and unread code."""
-    lessons = sorted({mark.exercise.split(".")[0] for mark in submissions[0].results})
+    lessons = sorted({mark.lesson for one in submissions for mark in one.results})
     names = [one.name for one in submissions]
     rows = [("", *lessons, "all", "to be read", "predictions")]
     for one in submissions:
-        rights = [mark.exercise.split(".")[0] for mark in one.results if mark.result == "right"]
+        rights = [lesson_of(name) for name in one.right]
         unread = sum(mark.result == _TO_BE_READ for mark in one.results)
         counts = [rights.count(lesson) for lesson in lessons]
         name = one.name if names.count(one.name) == 1 else f"{one.name} ({one.file})"
@@ -202,29 +343,40 @@ def write_table(submissions: Sequence[Submission], path: Path) -> None:
         for one in submissions
         for m in one.results
     ]
+    write_csv(path, _COLUMNS, rows)
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table as CSV. Only an unchanged table of an earlier grading is replaced."""
+    data = _as_csv([header, *([_csv_safe(part) for part in row] for row in rows)])
     try:
-        if path.is_file() and path.stat().st_size and not _is_table(path):
+        if path.is_file() and not _is_table(path.read_bytes(), header):
             raise InputError(
-                f"{path} was not written by an earlier grading, so it is not replaced. Give "
-                f"another file: --table CSV."
+                f"{path} is not an unchanged table of an earlier grading with these columns, so it "
+                f"is not replaced. Give another file: --table CSV."
             )
-        text = io.StringIO(newline="")
-        writer = csv.writer(text)
-        writer.writerow(_COLUMNS)
-        writer.writerows([csv_safe(part) for part in row] for row in rows)
-        write_whole(path, text.getvalue().encode(), keep_link=True)
+        write_whole(path, data, keep_link=True)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}.") from None
 
 
-def _is_table(path: Path) -> bool:
-    """Return whether a file begins like one of `write_table`."""
-    header = ",".join(_COLUMNS).encode()
-    with path.open("rb") as file:
-        return file.read(len(header)) == header
+def _as_csv(rows: Iterable[Sequence[object]]) -> bytes:
+    """Write rows as CSV with quotes around every cell, by which `_is_table` knows our tables."""
+    text = io.StringIO(newline="")
+    csv.writer(text, quoting=csv.QUOTE_ALL).writerows(rows)
+    return text.getvalue().encode()
 
 
-def csv_safe(value: object) -> object:
+def _is_table(data: bytes, header: Sequence[str]) -> bool:
+    """Return whether a file is empty, or is a table of `write_csv` as it was written."""
+    try:
+        rows = [*csv.reader(io.StringIO(data.decode(), newline=""))]
+    except (UnicodeDecodeError, csv.Error):
+        return False
+    return not data or (rows[0] == [*header] and _as_csv(rows) == data)
+
+
+def _csv_safe(value: object) -> object:
     """Keep a spreadsheet from reading a value as a formula, even if it splits cells at ";"."""
     if not isinstance(value, str):
         return value
