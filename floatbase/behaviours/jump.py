@@ -184,10 +184,11 @@ class Jump:
     contacts, and the feet move relative to the centre of mass to the place where they land. After
     the landing, the contacts are soft, because the feet do not land at the same time.
 
-    The robot jumps in the direction of x from its standing posture at the origin. A foot
-    counts as landed if it is near a known `ground`, or if the centre of mass falls more slowly than
-    in free fall. So the robot also lands on ground that is higher or lower than expected. The way
-    to the landing place is not checked: a foot may hit an edge on the way.
+    The robot jumps in the direction of x from its standing posture at the origin. With a known
+    `ground`, it lands when a foot reaches the height of this ground. Otherwise, it lands when the
+    centre of mass falls more slowly than in free fall. So it also lands on ground that is higher or
+    lower than expected, but a push upwards counts as a landing, too. The way to the landing place
+    is not checked: a foot may hit an edge on the way.
 
     Before it accepts a jump, the controller integrates the push with the equations of motion,
     without a simulator and without torque limits. It refuses a jump for which a motor is too weak
@@ -360,15 +361,17 @@ class Jump:
                 self._goal = np.array([*feet[:2], level]) + self._com_offset
 
     def _touched(self, state: State, t: float) -> float | None:
-        """Return how much higher the ground is than at the start, or None in flight [m]."""
-        names = self._all_contacts.names
-        feet = np.array([state.point(foot) for foot in names])
-        levels = feet[:, 2] - [self._standing.point(foot)[2] for foot in names]
+        """Return how much higher the ground is than at the start, or None in flight [m].
+
+        With a known ground, only the height of the feet above it counts.
+        """
+        contacts = self._all_contacts
+        points = contacts.positions(state)
+        levels = points[:, 2] - contacts.positions(self._standing)[:, 2]
         if self._ground is not None:
-            grounds = [self._ground_level(foot[:2]) for foot in feet]
+            grounds = [self._ground_level(point[:2]) for point in points]
             lowest = int(np.argmin(levels - grounds))
-            if levels[lowest] - grounds[lowest] < _TOUCH_HEIGHT:
-                return grounds[lowest]
+            return grounds[lowest] if levels[lowest] - grounds[lowest] < _TOUCH_HEIGHT else None
         assert self._apex is not None
         since, velocity = self._apex
         # a push from the side is no landing

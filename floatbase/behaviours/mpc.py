@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf, pi, remainder
+from math import cos, inf, pi, remainder, sin
 from typing import Any
 
 import numpy as np
@@ -240,7 +240,9 @@ class MPC(Walk):
         for k, row in enumerate(reference):
             time = t + (k + 1) * self._dt
             path = now.moved(self._progress.desired, time)
-            row[THETA], row[OMEGA] = [0.0, pose.pitch, path.yaw], [0.0, 0.0, path.velocity[2]]
+            lean, rate, _ = pose.lean(time)
+            row[THETA] = [0.0, pose.pitch + lean, path.yaw]
+            row[OMEGA] = [-rate * sin(path.yaw), rate * cos(path.yaw), path.velocity[2]]
             row[COM], row[VELOCITY], _ = com_target(self._posture, pose, active.plan, time)
             rise, speed = self._bounce(time)
             row[COM.stop - 1] += rise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -11,11 +12,14 @@ from floatbase._validation import Array
 from floatbase.affine import Affine
 from floatbase.dynamics import Block
 from floatbase.errors import InputError
+from floatbase.linear_algebra import null_space
 from floatbase.objectives import Task
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
+from floatbase.qp._levels import in_residuals
 
 # fraction of the largest slope that it balances: smaller multipliers may be rounding errors
-_SIGNIFICANT_MULTIPLIER = 1e-6
+_SIGNIFICANT_MULTIPLIER = 1e-12
+_SIGNIFICANT_SLOPE = 1e6  # times the slope that is left at the optimum, likewise
 
 
 def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
@@ -37,9 +41,9 @@ def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list
 
 
 def with_fixed_residuals(
-    qp: QP, solution: Solution, tasks: Sequence[Task], costs: Sequence[tuple[Block, float, Affine]]
+    qp: QP, x: Array, tasks: Sequence[Task], costs: Sequence[tuple[Block, float, Affine]]
 ) -> tuple[Array, Array, list[ConstraintLabel]]:
-    """Return equality constraints that keep the residuals of some tasks at their optimum."""
+    """Return equality constraints that keep the residuals of some tasks at those of x."""
     rows, right, names = [np.zeros((0, qp.n))], [np.zeros(0)], []
     for task, (block, weight, residual) in zip(tasks, costs, strict=True):
         if weight == 0.0:
@@ -47,7 +51,7 @@ def with_fixed_residuals(
         part = np.zeros((len(residual.b), qp.n))
         part[:, qp.blocks[block]] = residual.A
         rows.append(part)
-        right.append(residual.A @ solution[block])
+        right.append(residual.A @ x[qp.blocks[block]])
         names += [
             ConstraintLabel(f"task {task.name} {i}", "task", task.name, i)
             for i in range(len(residual.b))
@@ -71,42 +75,49 @@ def solve_levels(
     solutions: list[Solution] = []
     A, b, names = qps[0].A, qps[0].b, qps[0].equality_names
     h, penalties = qps[0].h, qps[0].penalties
+    free, x = qps[0].equality_space
     kept: dict[str, float] = {}
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
         level = replace(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
-        if solutions:
-            earlier = solutions[-1].violations
-            solution = replace(
-                _solve_from(solutions[-1].x, level, solver),
-                earlier_violations=earlier,
+        change, T, rank = in_residuals(level, terms, free, x)
+        found = solve(change, solver)
+        x = x + T @ found.x
+        solutions.append(
+            replace(
+                found,
+                qp=level,
+                x=x,
+                earlier_violations=solutions[-1].violations if solutions else {},
                 earlier_multipliers=dict(kept),
             )
-        else:
-            solution = solve(level, solver)
-        solutions.append(solution)
+        )
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
-        h, penalties = np.maximum(h, qp.G @ solution.x + FEASIBILITY_TOLERANCE * qp.row_norms), None
-        rows, right, labels = with_fixed_residuals(qp, solution, tasks, terms)
+        h, penalties = np.maximum(h, qp.G @ x + FEASIBILITY_TOLERANCE * qp.row_norms), None
+        rows, right, labels = with_fixed_residuals(level, x, tasks, terms)
         # relaxed like the others, these rows would let the torques change by far more than that
-        scaled = solution.inequality_multipliers * qp.row_norms
-        slopes = np.concatenate([qp.g, qp.H @ solution.x, scaled])
-        active = np.flatnonzero(scaled > _SIGNIFICANT_MULTIPLIER * np.max(np.abs(slopes)))
-        active_names = [qp.inequality_names[i] for i in active]
-        kept.update(
-            zip(active_names, solution.inequality_multipliers[active].tolist(), strict=True)
+        scaled = found.inequality_multipliers * qp.row_norms
+        slopes = np.concatenate([qp.g, qp.H @ x, scaled])
+        least = max(
+            _SIGNIFICANT_MULTIPLIER * np.max(np.abs(slopes)),
+            _SIGNIFICANT_SLOPE * found.residuals.stationarity,
         )
+        active = np.flatnonzero(scaled > least)
+        active_names = [cast(ConstraintLabel, qp.inequality_names[i]) for i in active]
+        kept.update(zip(active_names, found.inequality_multipliers[active].tolist(), strict=True))
+        free = T[:, rank:]
+        free = free @ null_space(qp.G[active] @ free / qp.row_norms[active, None], absolute=True)
         A = np.vstack([A, rows, qp.G[active]])
-        b = np.concatenate([b, right, qp.G[active] @ solution.x])
-        names = (*names, *labels, *active_names)
+        b = np.concatenate([b, right, qp.G[active] @ x])
+        for label in (*labels, *active_names):
+            names = (*names, _unused(label, names))
     return solutions
 
 
-def _solve_from(x: Array, qp: QP, solver: str) -> Solution:
-    """Solve a QP in the change from a point that satisfies its constraints.
-
-    With nearly dependent equalities, a solution of A x = b from b alone may miss inequalities that
-    the point satisfies.
-    """
-    change = solve(replace(qp, g=qp.g + qp.H @ x, b=np.zeros(len(qp.b)), h=qp.h - qp.G @ x), solver)
-    return replace(change, qp=qp, x=x + change.x)
+def _unused(label: ConstraintLabel, used: Sequence[str]) -> ConstraintLabel:
+    """Return a label, with a number if its text is in use, as that of a task of the same name."""
+    text, n = str(label), 1
+    while text in used:
+        n += 1
+        text = f"{label} ({n})"
+    return ConstraintLabel(text, label.kind, label.owner, label.number)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib.util import find_spec
@@ -32,6 +32,12 @@ _CONVEXITY_TOLERANCE = 1e-10
 # fraction of 1 + the largest variable by which polishing may change a variable: a larger step
 # would be more than a correction of the last digits
 _MAX_POLISHING_STEP = 1e-4
+_RANK_TOLERANCE = 1e-12  # of a singular system of optimality conditions, relative
+_ROUNDING = 1e-14  # fraction of the terms of a slope that may be rounding
+_STATIONARITY = 1e-12  # fraction of its largest term that the slope at an optimum may have
+# of the distance from the last point, which DAQP adds to an objective without curvature in some
+# direction, relative to the largest curvature: a larger one takes thousands of iterations
+_PROXIMAL_WEIGHT = 1e-6
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
@@ -166,14 +172,16 @@ def check_solver(solver: str) -> None:
 def _daqp(qp: QP) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
-    Return None if weights are so far apart that DAQP does not converge or that polishing fails.
-    Also return None if DAQP reports infeasibility, since it may mistake small curvature for it.
+    If polishing fails, `active_set` continues from DAQP's result. Return None if weights are so far
+    apart that DAQP does not converge. Also return None if DAQP reports infeasibility, since it may
+    mistake small curvature for it.
     """
     import daqp
 
     reduced, norms, rows = qp.reduced, qp.row_norms, len(qp.G)
-    if reduced.n == 0:
-        return None
+    if reduced.n == 0:  # the equalities determine x
+        only = _polished(qp, np.zeros(0), np.zeros(rows))
+        return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
     y, _, exit_flag, info = daqp.solve(
         reduced.H / scale,
@@ -183,7 +191,7 @@ def _daqp(qp: QP) -> Solution | None:
         np.full(rows, -1e30),  # DAQP treats this as no bound
         np.zeros(rows, dtype=np.int32),
         primal_tol=FEASIBILITY_TOLERANCE,
-        eps_prox=-1.0,
+        eps_prox=-_PROXIMAL_WEIGHT,
     )
     if exit_flag == -3:
         raise unbounded(qp)
@@ -192,15 +200,22 @@ def _daqp(qp: QP) -> Solution | None:
     if exit_flag not in (1, 2):
         # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
         return None
-    polished = _polished(
-        qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-    )
-    return None if polished is None else Solution(qp, *polished, "daqp", int(info["iterations"]))
+    y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
+    polished = _polished(qp, y, mu)
+    if polished is None:
+        return _active_set(qp, y, [qp.inequality_names[i] for i in np.flatnonzero(mu)])
+    return Solution(qp, *polished, "daqp", int(info["iterations"]))
 
 
-def _active_set(qp: QP) -> Solution:
-    """Solve from a cold start with `active_set` and polish the result."""
-    solution, space = active_set(qp).solution, qp.equality_space
+def _active_set(qp: QP, y: Array | None = None, working_set: Sequence[str] = ()) -> Solution:
+    """Solve with `active_set` from a guess in the coordinates of `qp.reduced`; polish the result.
+
+    Without a guess, the search starts at y = 0 if this point satisfies all rows.
+    """
+    space = qp.equality_space
+    if y is None and np.all(qp.reduced.h >= 0.0):
+        y = np.zeros(qp.reduced.n)
+    solution = active_set(qp, None if y is None else space(y), working_set).solution
     polished = _polished(qp, space.A.T @ (solution.x - space.b), solution.inequality_multipliers)
     return (
         solution
@@ -212,6 +227,8 @@ def _active_set(qp: QP) -> Solution:
 def _cvxpy(qp: QP) -> Solution | None:
     """Solve the whole problem, equalities included, with Clarabel at tight tolerances."""
     cp = require("cvxpy", extra="cvxpy")
+    if qp.n == 0:  # cvxpy refuses problems without variables
+        return _daqp(qp)
     reduced = qp.reduced
     # Clarabel does not check convexity
     if np.any(
@@ -265,28 +282,45 @@ _BACK_ENDS: dict[str, Callable[[QP], Solution | None]] = {
 
 
 def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
-    """Improve the last digits of x and μ by two Newton steps on the optimality conditions.
+    """Improve the last digits of x and μ by Newton steps on the optimality conditions.
 
-    With weights from 1e-8 to 1, the reduced H leaves few digits for the slope. Here the slope is
-    summed in extended precision, if the processor supports it, from the original problem. Return
-    None if a step is too large for rounding, or if it violates a row that is not active, which can
-    happen if the optimum is not unique.
+    Return None if the steps do not end at an optimum, because its active rows are others.
     """
-    reduced, space, n = qp.reduced, qp.equality_space, len(y)
+    for unique in (True, False):
+        with suppress(np.linalg.LinAlgError):
+            polished = _after_newton_steps(qp, y, mu, unique)
+            if polished is not None:
+                return polished
+    return None
+
+
+def _after_newton_steps(qp: QP, y: Array, mu: Array, unique: bool) -> tuple[Array, Array] | None:
+    """Return x and μ after two Newton steps, or None if they are not an optimum.
+
+    If the optimum or its multipliers are not unique, the steps are the shortest ones. No step may
+    be too large for rounding. With weights from 1e-8 to 1, the reduced H leaves few digits for the
+    slope. Here the slope is summed in extended precision, if the processor supports it, from the
+    original problem.
+    """
+    reduced, space, n, size = qp.reduced, qp.equality_space, len(y), qp.row_norms
     active = np.flatnonzero(mu > 0.0)
     G = reduced.G[active]
     K = np.zeros((n + len(G), n + len(G)))
     K[:n, :n], K[:n, n:], K[n:, :n] = reduced.H, G.T, G
+    scale = np.sqrt(_objective_scale(reduced))
+    units = np.append(np.full(n, 1.0 / scale), scale / size[active])  # make K comparable with 1
     Z, H, rows = (np.asarray(array, dtype=np.longdouble) for array in (space.A, qp.H, qp.G[active]))
     values = np.concatenate([y, mu[active]]).astype(np.longdouble)
     for _ in range(2):
         x = Z @ values[:n] + space.b
         slope = Z.T @ (H @ x + qp.g + rows.T @ values[n:])
         residual = np.concatenate([slope, rows @ x - qp.h[active]]).astype(np.float64)
-        try:
-            step = np.linalg.solve(K, residual)
-        except np.linalg.LinAlgError:  # an optimum that is not unique
-            return space(y), mu
+        step = (
+            np.linalg.solve(K, residual)
+            if unique
+            else units
+            * np.linalg.lstsq(units[:, None] * K * units, units * residual, _RANK_TOLERANCE)[0]
+        )
         if not np.max(np.abs(step[:n]), initial=0.0) < _MAX_POLISHING_STEP * (
             1.0 + np.max(np.abs(y), initial=0.0)
         ):
@@ -294,10 +328,15 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
         values -= step
     polished = np.zeros_like(mu)
     polished[active] = np.maximum(values[n:].astype(np.float64), 0.0)
-    point, size = space(values[:n].astype(np.float64)), qp.row_norms
-    if np.any((qp.G @ point - qp.h) / size > violation_tolerance(qp.h / size, point)):
-        return None
-    return point, polished
+    point = space(values[:n].astype(np.float64))
+    parts = qp.H @ point, qp.g, qp.G.T @ polished
+    rounding = _ROUNDING * np.max(np.abs(qp.H) @ (1.0 + np.abs(point)), initial=0.0)
+    is_steep = (
+        np.abs(space.A.T @ sum(parts))
+        > _STATIONARITY * np.max(np.abs(parts), initial=0.0) + rounding
+    )
+    is_outside = (qp.G @ point - qp.h) / size > violation_tolerance(qp.h / size, point)
+    return None if np.any(is_steep) or np.any(is_outside) else (point, polished)
 
 
 def _objective_scale(qp: QP) -> float:

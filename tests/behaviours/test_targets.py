@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import judges
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import floatbase as fb
@@ -90,6 +92,26 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name):
             parts = [each[task][:9] for each in (before, now, after)]
             omega = angular_velocity(*parts, 2.0 * step)
             assert np.allclose(omega, values[9:12], atol=1e-3)
+
+
+@pytest.mark.parametrize("backend", ["compiled", "reference"])
+def test_the_base_leans_and_turns_without_jumps_on_ground_that_a_walk_knows(backend):
+    """The derivatives of the target add up to its changes, also across changes of stance."""
+    robot = judges.load("go2")
+    contacts, gait = fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.05)
+    walk = Walk(robot, contacts, gait, (0.2, 0.0), 0.4, ground=fb.Ground(), backend=backend)
+    step, rows, stances = 2e-3, [], set()
+    for t in step * np.arange(500):  # the feet are on a plane that tilts, as on stairs
+        q = robot.standing().q.copy()
+        q[4], q[6] = np.sin(0.1 * np.sin(3.0 * t)), np.cos(0.1 * np.sin(3.0 * t))
+        rows.append(walk(q, np.zeros(robot.nv), t).targets["orientation of base"])
+        stances.add(walk.stance)
+    R, omega, alpha = np.split(np.array(rows), [9, 12], axis=1)
+    assert np.abs(R[:, 6]).max() > 0.05 and len(stances) > 1
+    turns = [pin.log3(b.reshape(3, 3) @ a.reshape(3, 3).T) for a, b in pairwise(R)]
+    assert np.allclose(turns, step * (omega[1:] + omega[:-1]) / 2.0, rtol=0.0, atol=2e-6)
+    level = step * (alpha[1:] + alpha[:-1])[:, :2] / 2.0  # the path's acceleration is no target
+    assert np.allclose(np.diff(omega, axis=0)[:, :2], level, rtol=0.0, atol=2e-4)
 
 
 def test_a_rollout_records_the_targets_of_each_step():

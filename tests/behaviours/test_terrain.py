@@ -88,3 +88,18 @@ def test_the_soles_of_talos_do_not_slide_on_a_slope_of_ten_degrees(axis):
     assert run.slip().max() < 3e-3
     tilt = 1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2)
     assert np.rad2deg(np.arccos(tilt.min())) < 3.0
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_a_standing_robot_is_balanced_above_the_middle_of_its_contacts_on_a_slope(name):
+    """The points at which its feet touch the slope, also after a turn."""
+    robot, normal = judges.load(name), np.array([-0.2, 0.1, 1.0])
+    contacts = fb.Contacts.feet(robot, mu=0.6, normals=normal / np.linalg.norm(normal))
+    turn = np.zeros(robot.nv)
+    turn[5] = 0.7 * any(foot.corners is None for foot in robot.feet)  # soles turn with the slope
+    state = robot.standing()
+    state = fb.State(robot, state.integrate(turn))
+    walk = Walk(robot, contacts, Gait.walk(robot, start=1.0))
+    walk(state.q, state.v, 0.0)
+    middle = contacts.positions(state).mean(axis=0)
+    assert walk.plan.zmp(0.0) == pytest.approx(middle[:2], abs=1e-6)

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cvxpy as cp
 import judges
 import numpy as np
 import pytest
 from messages import raises
+from scipy.linalg import null_space
+from scipy.optimize import linprog, lsq_linear, nnls
 
 import floatbase as fb
-from floatbase.control import JointLimits, _priorities
+from floatbase.control import JointLimits, _priorities, build_qp
 from floatbase.errors import InfeasibleError, InputError
+from floatbase.objectives import AngularMomentumTask, AxisTask
 from floatbase.robots import Robot, State
 
 
@@ -156,3 +161,130 @@ def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(name, m
         assert np.allclose(coarse["tau"], levels[-1]["tau"], rtol=0.0, atol=1e-9)
         assert levels[1].active and set(levels[1].active) <= set(levels[-1].active)
         assert levels[1].multipliers.items() <= levels[-1].multipliers.items()
+
+
+def random_problem(name: str, seed: int) -> tuple[State, fb.WholeBodyController]:
+    """Return a state and a controller with random tasks in two to four levels."""
+    robot, rng = judges.load(name), np.random.default_rng([seed, len(name), ord(name[0])])
+    standing, contacts = robot.standing(), judges.stance(robot, rng.uniform(0.2, 1.2))
+    state = robot.random_state(seed, rng.choice([0.0, 0.02, 0.1, 0.3]))
+    frame, kp = str(rng.choice(robot.frames)), rng.uniform(1.0, 100.0)
+    away, axis, momentum = rng.normal(0.0, 0.2, 3), rng.normal(size=3), rng.normal(size=3)
+    weights = [*10.0 ** rng.uniform(-2.0, 2.0, 6), *10.0 ** rng.uniform(-6.0, -1.0, 2)]
+    tasks = [
+        fb.CoMTask(standing.com + away, weight=weights[0]),
+        fb.OrientationTask("base", np.eye(3), kp=kp, weight=weights[1]),
+        fb.FrameTask(frame, state.point(frame) - away, kp=kp, weight=weights[2]),
+        AxisTask(frame, [0.0, 0.0, 1.0], axis, weight=weights[3]),
+        AngularMomentumTask(momentum, weight=weights[4]),
+        fb.PostureTask(standing.q, kp=kp, weight=weights[5]),
+        fb.ForceTask(weight=weights[6]),
+        fb.TorqueTask(weight=weights[7]),
+    ]
+    chosen = [tasks[i] for i in rng.permutation(len(tasks))[: rng.integers(4, 9)]]
+    cuts = [0, *np.sort(rng.choice(np.arange(1, 4), rng.integers(1, 4), replace=False)), None]
+    options = {
+        "contact_weight": rng.choice([None, 10.0 ** rng.uniform(1.0, 4.0)]),
+        "joint_limits": rng.choice(
+            [None, JointLimits.of(robot, weight=None), JointLimits.of(robot, weight=30.0)]
+        ),
+        "facets": int(rng.integers(3, 9)),
+        "min_normal_force": rng.choice([0.0, 5.0]),
+        "normal_force_weight": rng.choice([None, 10.0 ** rng.uniform(0.0, 3.0)]),
+    }
+    levels = [chosen[begin:end] for begin, end in pairwise(cuts)]
+    return state, fb.WholeBodyController(robot, contacts, levels, **options)
+
+
+def possible_gain(
+    H: np.ndarray, slope: np.ndarray, held: np.ndarray, G: np.ndarray, slack: np.ndarray,
+    most: np.ndarray,
+) -> float:  # fmt: skip
+    """Return by how much a step that keeps `held` and G x ≤ h lowers a cost, at least.
+
+    The step is along the steepest feasible descent: what is left of the slope if the active rows
+    balance it as well as they can, by nonnegative or bounded least squares.
+    """
+    Z = null_space(held, rcond=1e-9)
+    near = slack < 1e-7
+    fixed = np.where(slack[near] < -1e-7, most[near], 0.0)  # violated soft rows push fully
+    rows, left = (G[near] @ Z).T, -Z.T @ slope
+    left = left - rows @ fixed
+    if rows.size:
+        balance = nnls(rows, left, maxiter=10_000)[0]
+        if np.any(balance > most[near] - fixed):
+            bounds = (0.0, np.maximum(most[near] - fixed, 1e-12))
+            balance = lsq_linear(rows, left, bounds, "bvls", max_iter=2000).x
+        left = left - rows @ balance
+    step = Z @ left
+    rates, curvature = G @ step, step @ H @ step
+    blocking = ~near & (rates > 0.0)
+    length = np.min(slack[blocking] / rates[blocking], initial=(left @ left) / (curvature or 1.0))
+    return float(length * (left @ left) - length**2 * curvature / 2.0)
+
+
+def check_levels(state: State, controller: fb.WholeBodyController) -> bool:
+    """Check that no level can be improved; return whether there is a solution."""
+    problem = controller.problem
+    eom = fb.equations_of_motion(state, controller.contacts)
+    qp = build_qp(eom, problem.tasks, problem.limits)
+    G, h = qp.G / qp.row_norms[:, None], qp.h / qp.row_norms
+    most = np.full(len(h), np.inf) if qp.penalties is None else qp.penalties * qp.row_norms
+    try:
+        solutions = problem.solve_levels(state)
+    except InfeasibleError:
+        hard = ~np.isfinite(most)
+        least = linprog(np.zeros(qp.n), G[hard], h[hard], qp.A, qp.b, bounds=(None, None))
+        assert least.status == 2
+        return False
+    held, right = qp.A, qp.b
+    for level, solution in zip(problem.levels, solutions, strict=True):
+        x, slope, cost, parts = solution.x, np.zeros(qp.n), 0.0, []
+        for task in level:
+            A, b = task.residual(eom)
+            parts.append(np.zeros((len(b), qp.n)))
+            parts[-1][:, qp.blocks[task.block]] = np.sqrt(task.weight) * A
+            values = np.sqrt(task.weight) * (A @ solution[task.block] + b)
+            slope, cost = slope + parts[-1].T @ values, cost + values @ values / 2.0
+        J = np.vstack(parts)
+        assert np.allclose(held @ x, right, rtol=1e-7, atol=1e-6)
+        if solution is solutions[0]:
+            violated = G @ x - h
+            assert np.all(violated[~np.isfinite(most)] < 1e-6)
+        else:
+            h, most = np.maximum(h, G @ solutions[0].x), np.full(len(h), np.inf)
+            assert np.all(G @ x - h < 1e-6)
+        gain = possible_gain(J.T @ J, slope, held, G, h - G @ x, most)
+        assert gain < 1e-5 * (1.0 + cost), [task.name for task in level]
+        lengths = np.linalg.norm(J, axis=1)
+        held = np.vstack([held, J / np.maximum(lengths, 1e-6 * lengths.max())[:, None]])
+        right = held @ x
+    return True
+
+
+@pytest.mark.parametrize(
+    ("name", "n"),
+    [("go2", 20), ("talos", 35), ("g1", 25)]
+    + [
+        pytest.param(name, n, marks=pytest.mark.front_end)
+        for name, n in (("solo12", 130), ("hyq", 130), ("anymal_kinova", 130), ("talos", 130))
+    ],
+)
+def test_no_level_of_random_problems_can_be_improved(name, n):
+    solved = sum(check_levels(*random_problem(name, seed)) for seed in range(n))
+    assert solved > n / 3
+
+
+def test_tasks_of_one_name_can_be_in_several_levels():
+    robot = judges.load("go2")
+    contacts, state = judges.stance(robot), robot.random_state(1, 0.05)
+    first, second = (fb.OrientationTask("base", kp=kp) for kp in (100.0, 20.0))
+    tasks = [[first, first], [second], [fb.PostureTask(robot.standing().q)]]
+    controller = fb.WholeBodyController(robot, contacts, tasks)
+    alone = controller.replace(tasks=[[first], tasks[-1]])
+    assert np.allclose(
+        controller(state.q, state.v).tau, alone(state.q, state.v).tau, rtol=0.0, atol=1e-6
+    )
+    names = controller.qp(state).equality_names
+    rows = [name for name in names if "orientation of base 0" in name]
+    assert len(rows) == 3 and {label.owner for label in rows} == {first.name}

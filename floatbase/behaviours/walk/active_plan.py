@@ -136,7 +136,7 @@ class ActivePlan:
         }
         motions = {
             "centre of mass": com_target(posture, self._pose, plan, t),
-            "orientation of base": base_target(posture, self._pose, path),
+            "orientation of base": base_target(posture, self._pose, path, t),
         }
         for foot, swing in self._swings.items():
             motions[f"position of {foot}"] = swing(t)
@@ -167,7 +167,7 @@ class ActivePlan:
         posture = self._posture
         plan = self.plan
         path = self._path
-        desired = self._desired
+        desired, lean = self._desired, self._pose.lean
         body = np.zeros(numbers.BODY_SIZE)
         for first, values in (
             (numbers.TIME, (path.time, *path.position, path.yaw, *path.velocity)),
@@ -180,7 +180,8 @@ class ActivePlan:
             (numbers.DEAD_ZONE, (dead_zone(posture, plan), self._reach, MIN_SIDE_FRACTION)),
             (numbers.COM_ENTRY, (self._entries["centre of mass"].start,)),
             (numbers.BASE_ENTRY, (self._entries["orientation of base"].start,)),
-            (numbers.BASE_ROTATION, self._pose.rotation(posture).ravel()),
+            (numbers.BASE_ROTATION, posture.rotation("base").ravel()),
+            (numbers.PITCH, (self._pose.pitch + lean.goal, lean.begin, *lean.difference)),
         ):
             body[first : first + len(values)] = values
         return body

@@ -16,13 +16,15 @@ from floatbase.control.tick.jit import jit_cached
 TIME, POSITION, YAW, VELOCITY = 0, 1, 3, 4
 FIRST, LATER, FIRST_UNTIL, BEGIN, ACCELERATION = 7, 10, 13, 14, 15
 OMEGA, COM_HEIGHT, GROUND, DEAD_ZONE, REACH, SIDE_FRACTION = 18, 19, 20, 23, 24, 25
-COM_ENTRY, BASE_ENTRY, BASE_ROTATION, BODY_SIZE = 26, 27, 28, 37
+COM_ENTRY, BASE_ENTRY, BASE_ROTATION = 26, 27, 28
+PITCH, LEAN_BEGIN, LEAN, BODY_SIZE = 37, 38, 39, 42
 # columns of `swings`, (n, SWING_SIZE)
 START, PLANNED_END, END, LIFT_OFF, TOUCHDOWN, CLEARANCE = 0, 3, 5, 8, 9, 10
 NOMINAL, LANDING, FIRST_YAW, YAW_CHANGE, FIRST_TILT, TILT_CHANGE = 11, 14, 17, 18, 19, 21
 FOOT_ROTATION, POSITION_ENTRY, ROTATION_ENTRY, SWING_SIZE = 23, 32, 33, 34
 PIECE_SIZE = 9  # begin, then p, its slope, the coefficients a and b, (2,) each
 _MAX_EXPONENT_COM, _MAX_EXPONENT_STEP = 300.0, 50.0  # as in `lipm` and `footholds`
+_LEAN_RATE = 15.0  # 1/s, as in `targets`
 
 
 def make_write_targets(digest):
@@ -58,7 +60,6 @@ def make_write_targets(digest):
         body[POSITION + 1] += s * x + c * y
         body[YAW] += turn
         body[TIME] = t
-        c, s = np.cos(body[YAW]), np.sin(body[YAW])
 
         # centre of mass
         omega, piece = body[OMEGA], pieces.shape[0] - 1
@@ -86,14 +87,24 @@ def make_write_targets(digest):
             out[at + 3 * i + 2] = height
         out[at + 2] += body[COM_HEIGHT] + body[GROUND + 2]
 
-        # base
-        at = int(body[BASE_ENTRY])
+        # base: the lean is e^{-rate s} (a + b s + c s²)
+        s = max(t - body[LEAN_BEGIN], 0.0)
+        decay, slope = np.exp(-_LEAN_RATE * s), body[LEAN + 1] + 2.0 * body[LEAN + 2] * s
+        value = body[LEAN] + body[LEAN + 1] * s + body[LEAN + 2] * s * s
+        rate = decay * (slope - _LEAN_RATE * value)
+        bend = decay * (2.0 * body[LEAN + 2] - 2.0 * _LEAN_RATE * slope + _LEAN_RATE**2 * value)
+        pitch, turning, at = body[PITCH] + decay * value, body[VELOCITY + 2], int(body[BASE_ENTRY])
+        pitch_c, pitch_s = np.cos(pitch), np.sin(pitch)
+        c, s = np.cos(body[YAW]), np.sin(body[YAW])
         for j in range(3):
-            r0, r1 = body[BASE_ROTATION + j], body[BASE_ROTATION + 3 + j]
+            b0, b2 = body[BASE_ROTATION + j], body[BASE_ROTATION + 6 + j]
+            r0, r1 = pitch_c * b0 + pitch_s * b2, body[BASE_ROTATION + 3 + j]
             out[at + j], out[at + 3 + j] = c * r0 - s * r1, s * r0 + c * r1
-            out[at + 6 + j] = body[BASE_ROTATION + 6 + j]
-            out[at + 9 + j] = body[VELOCITY + 2] if j == 2 else 0.0
-            out[at + 12 + j] = 0.0
+            out[at + 6 + j] = pitch_c * b2 - pitch_s * b0
+        out[at + 9], out[at + 10], out[at + 11] = -rate * s, rate * c, turning
+        out[at + 12] = -bend * s - rate * turning * c
+        out[at + 13] = bend * c - rate * turning * s
+        out[at + 14] = 0.0
 
         # feet in the air
         size = np.sqrt(error_x * error_x + error_y * error_y)

@@ -11,6 +11,7 @@ from floatbase.behaviours.walk.active_plan import ActivePlan
 from floatbase.behaviours.walk.gait import TIME_TOLERANCE, Gait
 from floatbase.behaviours.walk.path import DesiredMotion, Path
 from floatbase.behaviours.walk.plan import StepPlan
+from floatbase.behaviours.walk.targets import Lean
 
 _RESTART_GAP = 0.2  # s without a call, after which another controller may have moved the robot
 _HISTORY_LENGTH = 500  # changes of stance that are kept: two minutes of a trot, 4 MB
@@ -71,7 +72,7 @@ class Progress:
     time: float = -inf  # of the last control step [s]
     start_time: float = -inf
     next_change: float = -inf
-    lean: float = 0.0  # of the body with the slope of a known ground [rad]
+    lean: Lean = field(default_factory=Lean)  # of the body with the slope of a known ground
     active: ActivePlan | None = None
     planning_path: Path | None = None  # while a plan is being made
     history: deque[StepPlan] = field(default_factory=lambda: deque(maxlen=_HISTORY_LENGTH))

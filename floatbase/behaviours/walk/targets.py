@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from math import cos, sin
+from dataclasses import dataclass, field
+from math import cos, exp, sin
 from typing import TypeAlias
 
 import numpy as np
@@ -26,17 +26,49 @@ Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, accelerati
 # called as adjustment(plan, path, com, com_velocity, t); returns the ends of the swings, (2,) or
 # (3,), in the world frame [m]
 Adjustment: TypeAlias = Callable[[StepPlan, Path, Array, Array, float], Mapping[str, npt.ArrayLike]]
+_LEAN_RATE = 15.0  # 1/s: the body leans with stairs 0.2 s later than they rise
 UNBOUNDED = 1e6  # N: a bound that no robot of the catalogue reaches
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
+class Lean:
+    """A pitch that approaches a goal with continuous velocity and acceleration."""
+
+    goal: float = 0.0
+    begin: float = 0.0
+    difference: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __call__(self, t: float) -> tuple[float, float, float]:
+        """Return the pitch at t [s], its velocity and its acceleration [rad, rad/s, rad/s²].
+
+        The difference from the goal is e^{-rate s} (a + b s + c s²), where s begins at 0.
+        """
+        s, (a, b, c) = max(t - self.begin, 0.0), self.difference
+        decay, value, slope = exp(-_LEAN_RATE * s), a + b * s + c * s * s, b + 2.0 * c * s
+        return (
+            self.goal + decay * value,
+            decay * (slope - _LEAN_RATE * value),
+            decay * (2.0 * c - 2.0 * _LEAN_RATE * slope + _LEAN_RATE**2 * value),
+        )
+
+    def towards(self, goal: float, t: float) -> Lean:
+        """Return the lean that continues from t [s] on towards another goal [rad]."""
+        now, velocity, acceleration = self(t)
+        a = now - goal
+        b = velocity + _LEAN_RATE * a
+        c = acceleration / 2.0 + _LEAN_RATE * b - _LEAN_RATE**2 / 2.0 * a
+        return Lean(goal, t, (a, b, c))
+
+
+@dataclass(frozen=True, eq=False)
 class BodyPose:
-    """Height and pitch of the body relative to the standing posture."""
+    """Height and pitch of the body relative to the standing posture, and how far it leans."""
 
     height: float
     pitch: float
+    lean: Lean = field(default_factory=Lean)
 
     @staticmethod
     def checked(height: float, pitch: float) -> BodyPose:
@@ -45,12 +77,6 @@ class BodyPose:
             as_number("height", height, "m", -_MAX_HEIGHT_CHANGE, _MAX_HEIGHT_CHANGE),
             as_number("pitch", pitch, "rad", -_MAX_PITCH, _MAX_PITCH),
         )
-
-    def rotation(self, posture: WalkingPosture) -> Array:
-        """Return the rotation of the base at zero yaw."""
-        c, s = cos(self.pitch), sin(self.pitch)
-        pitch = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-        return pitch @ posture.rotation("base")
 
 
 def adjusted_ends(
@@ -89,10 +115,18 @@ def com_target(posture: WalkingPosture, pose: BodyPose, plan: StepPlan, t: float
     return np.array([*x, height]), np.array([*v, slope @ v]), np.array([*a, slope @ a])
 
 
-def base_target(posture: WalkingPosture, pose: BodyPose, path: Path) -> Motion:
-    """Return the target of the base's rotation: the posture's, at the path's yaw."""
-    rotation = rotation_z(path.yaw) @ pose.rotation(posture)
-    return rotation, path.velocity[2] * _UP, np.zeros(3)
+def base_target(posture: WalkingPosture, pose: BodyPose, path: Path, t: float) -> Motion:
+    """Return the target of the base's rotation at t [s]: pitched from the posture's, then yawed."""
+    lean, rate, acceleration = pose.lean(t)
+    c, s, turning = cos(pose.pitch + lean), sin(pose.pitch + lean), path.velocity[2]
+    pitched = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ posture.rotation("base")
+    yaw = rotation_z(path.yaw)
+    forwards, left = yaw[:, 0], yaw[:, 1]
+    return (
+        yaw @ pitched,
+        rate * left + turning * _UP,
+        acceleration * left - rate * turning * forwards,
+    )
 
 
 def foot_rotation_target(

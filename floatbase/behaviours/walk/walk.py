@@ -56,7 +56,7 @@ from floatbase.robots import Robot, State
 
 Foothold: TypeAlias = Callable[[str, float, "Walk"], npt.ArrayLike]
 Entries: TypeAlias = Mapping[str, slice]  # of each task in the array of all targets
-_LEAN_FRACTION = 0.5  # of the slope, by which the body leans more at each change of stance
+_LEAN_FRACTION = 0.5  # of the slope, by which the goal of the lean moves at a change of stance
 
 
 class Walk:
@@ -583,7 +583,7 @@ class Walk:
     @property
     def _leaning_pose(self) -> BodyPose:
         """The requested height and pitch, with the lean of the body on a known ground."""
-        return BodyPose(self._pose.height, self._pose.pitch + self._progress.lean)
+        return replace(self._pose, lean=self._progress.lean)
 
     def _update_lean(self, plan: StepPlan) -> None:
         """Turn the body towards the slope below the feet, if the ground is known.
@@ -595,7 +595,9 @@ class Walk:
             return
         heading = np.array([cos(plan.path.yaw), sin(plan.path.yaw)])
         uphill = float(np.arctan(plan.ground.slope @ heading))
-        self._progress.lean += _LEAN_FRACTION * (-uphill - self._progress.lean)
+        lean = self._progress.lean
+        goal = lean.goal + _LEAN_FRACTION * (-uphill - lean.goal)
+        self._progress.lean = lean.towards(goal, plan.time)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without controllers and memory, so that a copy starts anew."""
