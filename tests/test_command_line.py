@@ -53,6 +53,20 @@ def test_jupyterlab_accepts_its_options_beside_those_of_the_course(jupyterlab, t
     assert mine == "mine" and os.listdir(course)
 
 
+@pytest.mark.parametrize("arguments", [["--port", "9000"], ["--no-browser", "week1"]])
+def test_the_value_of_an_option_does_not_become_the_folder(
+    jupyterlab, tmp_path, monkeypatch, capsys, arguments
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main(["lab", *arguments])
+    assert not missing(capsys.readouterr().err, "folder", "--port=9000")
+    assert jupyterlab == [] and os.listdir() == []
+    with pytest.raises(SystemExit):
+        main(["lab", "mine", *arguments])
+    assert jupyterlab[-2:] == arguments and os.listdir() == ["mine"]
+
+
 def test_the_base_install_says_how_to_get_what_a_command_needs(tmp_path):
     for command, extra in (("lab", "course"), ("lecture", "site")):
         run = in_the_base_install(command, tmp_path)
