@@ -7,7 +7,6 @@ from importlib.metadata import PackageNotFoundError, version
 
 import pytest
 from jupyterlab.labapp import LabApp
-from jupyterlab_server.config import get_page_config
 from messages import missing
 
 from floatbase.__main__ import main
@@ -58,8 +57,6 @@ def test_jupyterlab_gets_the_options_and_settings_of_the_course(
     monkeypatch.setenv("JUPYTER_CONFIG_PATH", course)
     app.load_config_file(suppress_errors=False)
     assert not app.config.LabApp.news_url and not app.config.LanguageServerManager.autodetect
-    (news,) = get_page_config([])["disabledExtensions"]
-    assert "announcements" in news
 
 
 @pytest.mark.parametrize("arguments", [["--port", "9000"], ["--no-browser", "week1"]])
