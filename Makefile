@@ -2,7 +2,7 @@
 # the exact versions in environment.txt.
 #
 #   PYTHON=…       the Python to use, such as python3.12 or a path; the default is that of .venv, or the first suitable one of
-#                  python3, python3.13, …
+#                  python3, python3.14, …
 #   LAB_ARGS=…     further options for JupyterLab, such as --no-browser or --port=9000
 #   SITE_ARGS=…    options for the site, such as "--to DIR" or "notebooks/01_floating_base.ipynb"
 #   PYTEST_ARGS=…  further options for pytest, such as "-k friction", tests/control, "--seed 1" or "-n 4"
@@ -13,9 +13,11 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-# uv downloads and installs; where it is missing, pip installs it into .venv first
-UV := $(shell command -v uv 2>/dev/null)
-INSTALL = VIRTUAL_ENV="$(CURDIR)/$(VENV)" $(if $(UV),"$(UV)",$(BIN)/uv) pip install
+# uv downloads and installs; where it is missing or does not run, pip installs it into .venv first
+UV := $(shell uv --version >/dev/null 2>&1 && command -v uv)
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+INSTALL := $(if $(UV),"$(UV)",{ test -x $(BIN)/uv || $(PIP) install -q -c environment.txt uv; } && $(BIN)/uv) \
+	pip install --python $(BIN)/python
 
 # Prints the key of .venv (Python version and folder), then the Python that creates it. A Python that is too old or too new prints
 # nothing, and neither does one without venv, unless uv creates .venv.
@@ -69,12 +71,13 @@ setup: $(VENV)/ready-$(KEY)
 FAILED := { echo; echo "The set-up is not complete; the reason is above. The network and about 3 GB of free disk space are needed."; \
 	echo "Then run the same command again."; exit 1; } >&2
 
-# .venv is created again if the lock, the Python or the folder has changed, or if the last attempt was interrupted
-$(VENV)/locked-$(KEY): environment.txt | python
-	@echo "Creating $(VENV) with $(BASE): it downloads about 600 MB, which takes a minute or two, and needs 2 GB."
+# .venv is created again if the lock, the Python or the folder has changed, if the last attempt was interrupted, or if the Python
+# that .venv links to was removed
+GONE := $(shell test -x $(BIN)/python || echo python)
+$(VENV)/locked-$(KEY): environment.txt $(GONE) | python
+	@echo "Creating $(VENV) with $(BASE): this downloads about 550 MB, takes a minute or two, and needs 2 GB."
 	@rm -rf $(VENV)
-	@$(if $(UV),"$(UV)" venv -q --seed --python "$(BASE)" $(VENV),"$(BASE)" -m venv $(VENV) && \
-		$(BIN)/python -m pip --disable-pip-version-check install -q -c environment.txt uv) || $(FAILED)
+	@$(if $(UV),"$(UV)" venv -q --seed --python "$(BASE)" $(VENV),"$(BASE)" -m venv $(VENV)) || $(FAILED)
 	@{ $(INSTALL) -q -c environment.txt hatchling editables && \
 		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course,sweep]" && touch $@; } 2>&1 | grep -v "^ [-+~] "; test -e $@ || $(FAILED)
 
@@ -97,9 +100,9 @@ python:
 	@if [ -z "$(FOUND)" ]; then \
 		echo "floatbase needs Python 3.11, 3.12, 3.13 or 3.14 with the venv module. $(or $(PYTHON),python3) is not suitable."; \
 		$(if $(PYTHON),,$(if $(UV),echo "uv did not bring one; the reason is above.";,\
-			echo "Install uv, which brings a Python of its own, and run make again:"; \
+			echo "Install uv, which brings its own Python, and run make again:"; \
 			echo "    curl -LsSf https://astral.sh/uv/install.sh | sh      (or: pipx install uv, brew install uv)";)) \
-		echo "You can also install a Python (on Debian and Ubuntu: apt install python3-venv), or name one:"; \
+		echo "$(if $(PYTHON)$(UV),Install,Or install) a Python (on Debian and Ubuntu: apt install python3-venv), or name one:"; \
 		echo "    make $(or $(MAKECMDGOALS),lab) PYTHON=/path/to/python3.13"; \
 		exit 1; \
 	fi >&2

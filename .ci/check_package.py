@@ -1,8 +1,8 @@
 """Install a wheel or an sdist into an environment of its own, and check that it works there.
 
 `python .ci/check_package.py dist/floatbase-0.1.0-py3-none-any.whl`; of the repository, only the
-README and the lock are used. The base install must print what the README says, find nothing wrong
-with itself, and have the notebooks of the course.
+README and the lock are used. The base install must print what the README says, have the notebooks
+of the course, use the compiled controller, and not compile what the wheel contains compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-COMMANDS = ("doctor", "lab --help", "robots")
+COMMANDS = ("lab --help", "robots", "doctor")
 LESSONS = """
 from pathlib import Path
 import floatbase
@@ -52,13 +52,17 @@ def faults_of(package: Path) -> list[str]:
 
         lessons = printed("python", "-I", "-c", LESSONS).split()
         for command in COMMANDS:
-            print(printed("floatbase", *command.split()))
+            print(answer := printed("floatbase", *command.split()))
+        uses_compiled = "compiled backend" in answer  # of the doctor
         example = printed("python", "-I", "-c", block("python"))
         print(f"{package.name}, {package.stat().st_size / 1e6:.2f} MB, prints\n{example}", end="")
+        code = ["_compiled" in file.parts for file in programs.parent.rglob("*.nbc")]
     expected = sorted(path.name for path in (ROOT / "notebooks").glob("*.ipynb"))
     faults = [f"{package.name} has the lessons {lessons}"] if lessons != expected else []
     if example != block("text"):
         faults.append(f"{package.name} does not print what the README says")
+    if not uses_compiled or len(set(code)) > 1:  # code of the wheel, and code compiled here
+        faults.append(f"{package.name} does not use compiled code, or compiles it again")
     return faults
 
 

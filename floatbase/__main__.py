@@ -80,7 +80,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=Path(),
         help="your copy of the lessons (default: this folder)",
     )
-    lab.epilog = "All further options go to JupyterLab, such as --no-browser or --port=9000."
+    lab.usage = (
+        "floatbase lab [FOLDER] [options of JupyterLab, such as --no-browser or --port=9000]"
+    )
     commands.add_parser("doctor", help="show what is installed, what is missing, and how to get it")
     for name, text in COURSE_COMMANDS.items():
         commands.add_parser(name, help=text, add_help=False)
@@ -92,11 +94,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     if further and options.command != "lab":
         parser.error(f"unrecognized arguments: {' '.join(further)}")
+    given = sys.argv[1:] if arguments is None else arguments
+    if options.command == "lab" and _folder_may_be_a_value(given[1:]):
+        lab.error("Name the folder first, and write options as in --port=9000.")
     try:
-        return _run(options, further, sys.argv[1:] if arguments is None else arguments)
+        return _run(options, further, given)
     except fb.FloatbaseError as error:
         print(f"floatbase: {error}", file=sys.stderr)
         return 2
+
+
+def _folder_may_be_a_value(arguments: Sequence[str]) -> bool:
+    """Return whether an option comes before what may be a folder, as in `--port 9000`."""
+    first, *rest = arguments or [""]
+    return first.startswith("-") and not all(text.startswith("-") for text in rest)
 
 
 def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[str]) -> int:
@@ -150,7 +161,9 @@ def _restart_message(given: Sequence[str], requested_port: int, port: int) -> st
 
     `given` are the arguments of the command line, and `requested_port` is the port among them or 0.
     """
-    command = shlex.join(["floatbase", *given, *([] if requested_port else ["--port", str(port)])])
+    is_script = Path(sys.argv[0]).name == "floatbase"  # which need not be on the path
+    program = [sys.argv[0]] if is_script else [sys.executable, "-m", "floatbase"]
+    command = shlex.join([*program, *given, *([] if requested_port else ["--port", str(port)])])
     return (
         f"The program has ended. Start it again with\n{command}\n"
         f"and this page reconnects by itself."

@@ -5,7 +5,6 @@ from __future__ import annotations
 import platform
 import re
 import sys
-from collections import defaultdict
 from importlib.metadata import PackageNotFoundError, requires, version
 
 import floatbase as fb
@@ -46,13 +45,13 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _extras() -> dict[str, list[str]]:
-    """Return the packages of each extra that a user may want."""
-    found: dict[str, list[str]] = defaultdict(list)
+def _extras() -> dict[str, dict[str, None]]:
+    """Return the packages of each extra that a user may want, each once and in order."""
+    found: dict[str, dict[str, None]] = {}
     for line in requires("floatbase") or []:
         match = re.match(r"([\w.-]+).*extra == ['\"]([\w-]+)", line)
         if match and match[1] != "floatbase" and match[2] not in _FOR_DEVELOPERS:
-            found[match[2]].append(match[1])
+            found.setdefault(match[2], {})[match[1]] = None
     return found
 
 

@@ -40,7 +40,10 @@ def jupyterlab(monkeypatch):
 
 
 @pytest.mark.parametrize("options", [[], ["--ip=0.0.0.0", "--port=9000"]])
-def test_jupyterlab_accepts_its_options_beside_those_of_the_course(jupyterlab, tmp_path, options):
+def test_jupyterlab_gets_the_options_and_settings_of_the_course(
+    jupyterlab, tmp_path, monkeypatch, options
+):
+    monkeypatch.setenv("JUPYTER_CONFIG_DIR", str(tmp_path / "none"))  # not this user's settings
     with pytest.raises(SystemExit):
         main(["lab", str(tmp_path), *options])
     _, *command = jupyterlab
@@ -50,7 +53,24 @@ def test_jupyterlab_accepts_its_options_beside_those_of_the_course(jupyterlab, t
     assert app.root_dir == str(tmp_path) and (tmp_path / "00_start_here.ipynb").exists()
     assert (app.ip, app.port) == (("0.0.0.0", 9000) if options else ("localhost", 8888))
     course, mine = os.environ["JUPYTER_CONFIG_PATH"].split(os.pathsep)
-    assert mine == "mine" and os.listdir(course)
+    assert mine == "mine"
+    monkeypatch.setenv("JUPYTER_CONFIG_PATH", course)
+    app.load_config_file(suppress_errors=False)
+    assert not app.config.LabApp.news_url and not app.config.LanguageServerManager.autodetect
+
+
+@pytest.mark.parametrize("arguments", [["--port", "9000"], ["--no-browser", "week1"]])
+def test_the_value_of_an_option_does_not_become_the_folder(
+    jupyterlab, tmp_path, monkeypatch, capsys, arguments
+):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main(["lab", *arguments])
+    assert not missing(capsys.readouterr().err, "folder", "--port=9000")
+    assert jupyterlab == [] and os.listdir() == []
+    with pytest.raises(SystemExit):
+        main(["lab", "mine", *arguments])
+    assert jupyterlab[-2:] == arguments and os.listdir() == ["mine"]
 
 
 def test_the_base_install_says_how_to_get_what_a_command_needs(tmp_path):
@@ -74,7 +94,7 @@ def in_the_base_install(command, folder):
 
 def test_the_doctor_names_a_missing_package_and_the_command_that_installs_it(capsys, monkeypatch):
     def installed(name):
-        if name == "loky":
+        if name in ("loky", "ipywidgets"):
             raise PackageNotFoundError(name)
         return version(name)
 
@@ -84,7 +104,8 @@ def test_the_doctor_names_a_missing_package_and_the_command_that_installs_it(cap
         line.split(": ", 1) for line in capsys.readouterr().out.split("\n") if ": " in line
     )
     assert not missing(lines["sweep"], "loky", 'pip install "floatbase[sweep]"')
-    assert lines["viewer"] == "installed"
+    assert lines["course"].count("ipywidgets") == 1  # also its extra `viewer` needs it
+    assert lines["cvxpy"] == "installed"
 
 
 def test_commands_of_the_course_get_their_arguments(capsys, tmp_path):

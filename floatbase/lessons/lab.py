@@ -22,7 +22,8 @@ _TABS = ".open_tabs"  # kept with the copy, so that tabs of another copy do not 
 def open_lab(folder: Path, arguments: Sequence[str] = ()) -> None:
     """Update the lessons in a folder, and become JupyterLab there.
 
-    Meanwhile the controller compiles, if it is not compiled; the first cell that needs it waits.
+    A second process compiles the controller if necessary. The first cell that needs the controller
+    waits for this process.
     """
     if find_spec("jupyterlab") is None:
         raise FloatbaseError(

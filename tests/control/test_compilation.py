@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import fcntl
 import inspect
 import multiprocessing
 import os
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,7 @@ from messages import missing, raises
 from numba.core.caching import CacheImpl
 from numba.core.runtime import _nrt_python as counts
 from numba.core.runtime import rtsys
+from waiting import PATIENCE, until
 
 import floatbase as fb
 from floatbase.__main__ import main
@@ -322,6 +326,27 @@ def test_a_full_disk_leaves_a_compiled_tick_and_a_warning(small):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert "disk" not in small()
+
+
+def test_a_controller_waits_for_another_process_that_compiles_until_the_user_interrupts(small):
+    def interrupt() -> None:
+        until(lambda: jit.waiting)
+        time.sleep(0.1)  # s until the lock is requested
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    small()
+    with ThreadPoolExecutor(1) as other:
+        with open(Path(tick.tick.stats.cache_path) / "compiling.lock", "a") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            sent = other.submit(interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                small()
+            sent.result()
+            assert not jit.waiting
+            made = other.submit(small)
+            until(lambda: jit.waiting)
+            assert not made.done()
+        assert made.result(PATIENCE) and not jit.waiting
 
 
 def test_the_tick_compiles_where_no_folder_can_be_written(small, monkeypatch):

@@ -42,12 +42,11 @@ def course(tmp_path, monkeypatch):
     return Path(shutil.copy(LESSON, tmp_path / "notebooks"))
 
 
-def run_install_cell(monkeypatch, *, installed):
+def run_install_cell(monkeypatch, found):
     """Run the cell of a lesson; return what it asks pip for, and what it prints."""
     ((_, cell),) = install_cells(LESSON)
     shell, pip, printed = InteractiveShell(), Mock(), StringIO()
     shell.register_magic_function(pip, magic_name="pip")
-    found = ModuleSpec("floatbase", None) if installed else None
     monkeypatch.setattr("importlib.util.find_spec", lambda name: found)
     with redirect_stdout(printed):
         shell.run_cell(cell.source).raise_error()
@@ -55,12 +54,16 @@ def run_install_cell(monkeypatch, *, installed):
 
 
 def test_the_cell_installs_the_course_where_it_is_missing_and_does_nothing_elsewhere(monkeypatch):
-    assert run_install_cell(monkeypatch, installed=True) == ([], "")
-    ((asked,), _) = run_install_cell(monkeypatch, installed=False)
+    spec = ModuleSpec("floatbase", None, origin="floatbase/__init__.py", is_package=True)
+    assert run_install_cell(monkeypatch, spec) == ([], "")
+    ((asked,), _) = run_install_cell(monkeypatch, None)
     course, numba = map(Requirement, asked.replace('"', "").removeprefix("install -q ").split())
     assert (course.name, str(course.specifier)) == ("floatbase", f"=={fb.__version__}")
     # a wheel has compiled code for this numba alone
     assert str(numba) in (ROOT / "environment.txt").read_text(encoding="utf-8").splitlines()
+    # a folder named floatbase, such as a clone beside the notebook, is not the course
+    folder = ModuleSpec("floatbase", None, is_package=True)
+    assert run_install_cell(monkeypatch, folder)[0] == [asked]
 
 
 def test_only_the_files_of_the_course_have_the_cell(course, tmp_path):

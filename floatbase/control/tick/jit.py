@@ -149,10 +149,13 @@ def compile_lock(function: Any, *, ahead: bool = False) -> Iterator[None]:
         with suppress(OSError):  # without a lock, both compile
             os.makedirs(folder, exist_ok=True)
             file = stack.enter_context(open(Path(folder) / _LOCK_FILE, "a"))
-            waiting = True
-            fcntl.flock(file, fcntl.LOCK_EX if ahead else fcntl.LOCK_SH)
-        waiting, _compiles_ahead = False, ahead
+            try:
+                waiting = True
+                fcntl.flock(file, fcntl.LOCK_EX if ahead else fcntl.LOCK_SH)
+            finally:  # also if the user interrupts
+                waiting = False
         try:
+            _compiles_ahead = ahead
             yield
         finally:
             _compiles_ahead = False

@@ -20,7 +20,7 @@ _CELL = """\
 import site
 from importlib.util import find_spec
 
-if find_spec("floatbase") is None:
+if getattr(find_spec("floatbase"), "origin", None) is None:
     %pip install -q "floatbase[lessons]=={version}" numba=={numba}
     site.main()  # finds the new packages without a restart"""
 
@@ -28,7 +28,8 @@ if find_spec("floatbase") is None:
 def insert_install_cell(notebook: Any) -> None:
     """Insert the cell below the title of a lesson, in place.
 
-    It names the numba for which a wheel contains the compiled controller.
+    It names the numba for which a wheel contains the compiled controller. A folder named floatbase,
+    such as a clone, is found without an origin and is not the installed course.
     """
     from nbformat.v4 import new_code_cell
 

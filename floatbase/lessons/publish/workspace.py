@@ -1,6 +1,6 @@
 """Keep the learner's own copy of the lessons up to date without overwriting the learner's work.
 
-`make lab` calls this before it opens the course. It reads notebooks as JSON, which is fast.
+`floatbase lab` does this before it opens the course. Notebooks are read as JSON, which is fast.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
     """Copy new lessons to the learner's folder, and update those that were not edited."""
     if not folder.is_dir():
         raise InputError(
-            f"There are no lessons in {folder}. Install floatbase from its repository with `pip "
-            f"install -e`."
+            f"There are no lessons in {folder}. The installation is incomplete: install floatbase "
+            f"again."
         )
     mine = folder / MY_FOLDER if mine is None else mine
     try:
