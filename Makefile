@@ -68,7 +68,7 @@ site: $(VENV)/tests-$(KEY)
 setup: $(VENV)/ready-$(KEY)
 
 # what is printed where an installation fails; the next try starts it again
-FAILED := { echo; echo "The set-up is not complete; the reason is above. The network and about 3 GB of free disk space are needed."; \
+FAILED := { echo; echo "The set-up is not complete; the reason is above. The network and up to 3 GB of free disk space are needed."; \
 	echo "Then run the same command again."; exit 1; } >&2
 
 # .venv is created again if the lock, the Python or the folder has changed, if the last attempt was interrupted, or if the Python
@@ -79,7 +79,7 @@ $(VENV)/locked-$(KEY): environment.txt $(GONE) | python
 	@rm -rf $(VENV)
 	@$(if $(UV),"$(UV)" venv -q --seed --python "$(BASE)" $(VENV),"$(BASE)" -m venv $(VENV)) || $(FAILED)
 	@{ $(INSTALL) -q -c environment.txt hatchling editables && \
-		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course,sweep]" && touch $@; } 2>&1 | grep -v "^ [-+~] "; test -e $@ || $(FAILED)
+		$(INSTALL) -c environment.txt --no-build-isolation -e ".[course,sweep]" && touch $@; } 2>&1 | grep -vE "^ [-+~] |^ *Downloading "; test -e $@ || $(FAILED)
 
 $(VENV)/installed-$(KEY): $(VENV)/locked-$(KEY) pyproject.toml
 	@$(INSTALL) -q --no-deps --no-build-isolation -e . || $(FAILED)

@@ -34,7 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="floatbase", description="Control of floating-base robots."
     )
-    commands = parser.add_subparsers(dest="command", required=True)
+    parser.suggest_on_error = True  # type: ignore[attr-defined]  # since Python 3.14
+    parser.add_argument("--version", action="version", version=f"floatbase {fb.__version__}")
+    commands = parser.add_subparsers(dest="command")
     commands.add_parser("robots", help="list the available robots and their uses")
     view = commands.add_parser("view", help="show a live robot in the browser (Ctrl-C to stop)")
     view.add_argument(
@@ -87,6 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, text in COURSE_COMMANDS.items():
         commands.add_parser(name, help=text, add_help=False)
     options, further = parser.parse_known_args(arguments)
+    if options.command is None:
+        parser.print_help()
+        return 0
     if options.command in COURSE_COMMANDS:
         from floatbase.lessons.publish.__main__ import main as run_course_command
 

@@ -29,9 +29,12 @@ def open_lab(folder: Path, arguments: Sequence[str] = ()) -> None:
         raise FloatbaseError(
             'JupyterLab is not installed. Install the course with pip install "floatbase[course]".'
         )
-    for line in prepare_workspace(mine=folder):
-        print(line)
-    sys.stdout.flush()
+    messages = prepare_workspace(mine=folder)
+    others = [message for message in messages if not message.endswith(": new")]
+    print(*others, sep="\n", end="\n" if others else "")
+    if len(others) < len(messages):
+        print(f"{len(messages) - len(others)} new files in {folder}.")
+    print("To stop JupyterLab, press Ctrl-C here, then y and Enter.", flush=True)
     subprocess.Popen(
         [sys.executable, "-m", "floatbase", "compile"],
         stdout=subprocess.DEVNULL,

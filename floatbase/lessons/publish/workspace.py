@@ -47,8 +47,9 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
         mine.mkdir(parents=True, exist_ok=True)
         mine.resolve()  # fails if the present folder is gone
     except OSError as error:
+        reason = "it is a file" if mine.is_file() else error.strerror
         raise InputError(
-            f"The folder {mine} cannot be created: {error.strerror}. Choose one that you can write "
+            f"The folder {mine} cannot be created: {reason}. Choose one that you can write "
             f"to."
         ) from None
     record, messages = read_record(mine), []
