@@ -52,6 +52,13 @@ def test_a_process_that_is_killed_leaves_the_former_file(tmp_path):
     assert target.read_bytes() == b"new"
 
 
+def test_a_file_that_cannot_be_written_is_named(tmp_path):
+    target = tmp_path / "gone" / "answers.json"
+    with pytest.raises(FileNotFoundError) as failed:
+        write_whole(target, b"new")
+    assert failed.value.filename == str(target)
+
+
 def test_the_permissions_of_a_file_are_kept(tmp_path):
     target = tmp_path / "answers.json"
     target.write_bytes(b"former")
