@@ -77,7 +77,7 @@ def test_a_pipe_is_written_and_not_replaced(linked, tmp_path):
     reader.start()
     write_table([], link if linked else pipe)  # such as --table /dev/stdout
     reader.join(20.0)
-    assert received[0].startswith(b"file,name") and pipe.is_fifo() and link.is_symlink()
+    assert received[0].startswith(b'"file","name"') and pipe.is_fifo() and link.is_symlink()
 
 
 def test_two_files_of_one_folder_can_be_written_at_once(tmp_path):

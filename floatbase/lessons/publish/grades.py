@@ -358,7 +358,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]
     """Write a table as CSV. Only an unchanged table of an earlier grading is replaced."""
     data = _as_csv([header, *([_csv_safe(part) for part in row] for row in rows)])
     try:
-        if path.is_file() and not _is_table(path.read_bytes(), header):
+        if path.is_file() and not _is_table(read_file(path), header):
             raise InputError(
                 f"{path} is not an unchanged table of an earlier grading with these columns, so it "
                 f"is not replaced. Give another file: --table CSV."
