@@ -55,6 +55,9 @@ def whole_file(path: Path, keep_link: bool = False) -> Iterator[Path]:
             part.open("xb").close()
         except FileExistsError:
             continue
+        except OSError as error:  # people know the file's name, not that of the new one
+            error.filename = str(path)
+            raise
         break
     try:
         yield part

@@ -52,6 +52,13 @@ def test_a_process_that_is_killed_leaves_the_former_file(tmp_path):
     assert target.read_bytes() == b"new"
 
 
+def test_a_file_that_cannot_be_written_is_named(tmp_path):
+    target = tmp_path / "gone" / "answers.json"
+    with pytest.raises(FileNotFoundError) as failed:
+        write_whole(target, b"new")
+    assert failed.value.filename == str(target)
+
+
 def test_the_permissions_of_a_file_are_kept(tmp_path):
     target = tmp_path / "answers.json"
     target.write_bytes(b"former")
@@ -70,7 +77,7 @@ def test_a_pipe_is_written_and_not_replaced(linked, tmp_path):
     reader.start()
     write_table([], link if linked else pipe)  # such as --table /dev/stdout
     reader.join(20.0)
-    assert received[0].startswith(b"file,name") and pipe.is_fifo() and link.is_symlink()
+    assert received[0].startswith(b'"file","name"') and pipe.is_fifo() and link.is_symlink()
 
 
 def test_two_files_of_one_folder_can_be_written_at_once(tmp_path):

@@ -113,8 +113,8 @@ def _kept_tries() -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
-            was_right = found.get(name, {}).get("right") == 1
-            if "answer" in entry and (entry.get("right") == 1 or not was_right):
+            is_better = _rights(entry) > 0 or _rights(found.get(name, {})) == 0
+            if "answer" in entry and is_better:
                 found[name] = entry
     return found
 
@@ -354,6 +354,12 @@ def is_answer(value: Any) -> bool:
     return _is_text(value) or (
         bool(numbers) and all(type(x) in (int, float) and abs(x) <= MAX_MAGNITUDE for x in numbers)
     )
+
+
+def _rights(entry: dict[str, Any]) -> int:
+    """Return how many tries of an entry were right; an entry from the site holds several tries."""
+    right = entry.get("right")
+    return right if type(right) is int else 0
 
 
 def _is_bool(value: Any) -> bool:

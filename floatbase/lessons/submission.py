@@ -113,7 +113,8 @@ def hand_in(name: str, folder: str | Path = ".", *, id: str = "", lesson: str = 
 def import_answers(path: str | Path) -> None:
     """Add the answers that a page of the site saved to your progress.
 
-    `review`, `recall`, `show_progress` and `hand_in` then know them. What is known already stays.
+    `review`, `recall`, `show_progress` and `hand_in` then know them. What is known already stays,
+    but a right answer to an exercise replaces a wrong one.
 
     Parameters
     ----------
@@ -152,10 +153,12 @@ def _predictions_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]
 
 
 def _tries_in(found: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield tries of exercises in a page's file, for exercises that were not tried yet."""
+    """Yield tries in a page's file of exercises that were not tried, or not solved until now."""
     tried = progress.load()
     for name, entry in found["exercises"].items():
-        if name in all_exercises() and name not in tried and isinstance(entry, dict):
+        if name not in all_exercises() or not isinstance(entry, dict):
+            continue
+        if name not in tried or (entry.get("right") and not tried[name]["right"]):
             yield name, entry
 
 

@@ -305,6 +305,18 @@ def test_a_gradebook_matches_files_without_an_id_by_name(learner):
         gradebook.write_gradebook("moodle", [], table, table, column="Week", policy=policy)
 
 
+def test_points_are_written_to_the_assignment_of_that_name(learner):
+    table = learner / "points.csv"
+    (learner / "roster.csv").write_text("Student,ID,Week 1 (bonus) (7),Week 1 (8)\n")
+    args = ("canvas", [], learner / "roster.csv", table)
+    for column, written in (("Week 1", "Week 1 (8)"), ("Week 1 (bonus)", "Week 1 (bonus) (7)")):
+        gradebook.write_gradebook(*args, column=column, policy=gradebook.Policy())
+        assert next(csv.reader(table.open())) == ["Student", "ID", written]
+        table.unlink()
+    with pytest.raises(InputError, match="column"):
+        gradebook.write_gradebook(*args, column="ID", policy=gradebook.Policy())
+
+
 @pytest.mark.parametrize(
     ("kind", "roster"),
     [

@@ -156,6 +156,12 @@ def test_a_reader_answers_lesson_03_reloads_and_hands_in(page, tmp_path, monkeyp
     calibration = f"when you were sure {len(names[::3]) - len(sure)} of {len(names[::3])} times"
     assert calibration in page.locator(".answers-review p").inner_text()
 
+    page.evaluate("() => { Storage.prototype.setItem = () => { throw new Error('full'); }; }")
+    for form in (forms.first, exercise):
+        form.locator("button").click()
+        assert "cannot store" in form.locator("output").inner_text()
+    page.reload()
+
     page.locator(".answers-review input").fill("Ada Lovelace")
     with page.expect_download() as download:
         page.locator(".answers-review button").click()

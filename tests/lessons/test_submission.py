@@ -14,7 +14,15 @@ from hints import LIFTED, ODD
 
 import floatbase as fb
 from floatbase.errors import InputError
-from floatbase.lessons import all_exercises, check, hand_in, predict, progress
+from floatbase.lessons import (
+    all_exercises,
+    check,
+    hand_in,
+    import_answers,
+    predict,
+    progress,
+    submission,
+)
 from floatbase.lessons.publish import NOTEBOOKS, grades, read_notebook, write_solutions
 from floatbase.lessons.publish.__main__ import main
 
@@ -206,7 +214,7 @@ def test_hand_in_refuses_a_folder_that_is_not_a_path(learner, folder):
         hand_in("Ada", folder)
 
 
-def test_the_last_of_two_files_of_a_learner_counts(learner):
+def test_the_last_of_two_files_of_a_learner_counts(learner, capsys):
     check("00.1", LIFTED)
     files = []
     for time in ("2026-05-02T10:00:00+00:00", "2026-05-01T10:00:00+00:00"):
@@ -221,6 +229,12 @@ def test_the_last_of_two_files_of_a_learner_counts(learner):
     ):
         found, _ = grades.grade_files(files, **options)
         assert {one.file for one in found} == kept
+    files[-1].write_text(files[-1].read_text().replace("2026-05-01T", "May 1, "))
+    capsys.readouterr()
+    with pytest.raises(InputError):
+        grades.grade_files(files, before=noon)
+    printed = capsys.readouterr().out
+    assert all(path.name in printed for path in files)  # both are left out
 
 
 def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner):
@@ -230,6 +244,21 @@ def test_a_file_keeps_the_last_right_answer_or_else_the_last(learner):
     for answer in (LIFTED, 3.0):
         check("00.1", answer)
     assert progress.answers() == {"00.1": LIFTED}
+
+
+@pytest.mark.parametrize("tried", [[], [3.0]])
+def test_a_right_answer_from_the_site_counts_before_and_after_wrong_ones(learner, tried):
+    """The site counts the tries of an exercise, so an entry may have been right twice."""
+    entry = {"tries": 3, "right": 2, "answer": LIFTED}
+    saved = {"form": submission.FILE_FORMAT, "predictions": {}, "exercises": {"00.1": entry}}
+    Path("saved.json").write_text(json.dumps(saved))
+    for answer in tried:
+        check("00.1", answer)
+    for _ in range(2):
+        import_answers("saved.json")
+    check("00.1", 4.0)
+    assert progress.load()["00.1"] == {"tries": 4 + len(tried), "right": 2}
+    assert grades.grade_file(hand_in("Ada")).right == {"00.1"}
 
 
 def test_lessons_for_teachers_hold_the_solutions(learner):

@@ -223,7 +223,7 @@ def _grade(given: Namespace) -> int:
         raise InputError("--due and --late-days need --gradebook, --gradescope or --results.")
     submissions, unread = grades.grade_files(
         given.files,
-        latest=given.latest,
+        latest=given.latest and not given.gradebook,  # which joins the files that are in time
         before=given.before,
         lessons=policy.lessons,
         own_numbers=given.own_numbers,
@@ -234,7 +234,8 @@ def _grade(given: Namespace) -> int:
     if given.code:
         print(grades.code_to_read(submissions))
     if given.inventory:
-        print(inventory.gain_report([one.inventory for one in submissions]))
+        students, _ = grades.join_students(submissions)
+        print(inventory.gain_report([one.inventory for one in students]))
     if given.gradebook:
         for line in gradebook.write_gradebook(
             given.gradebook,

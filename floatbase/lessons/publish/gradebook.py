@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, tzinfo
@@ -95,6 +96,11 @@ def write_gradebook(
         raise InputError(f"{table} is the roster, so it is not replaced. Give another --table CSV.")
     kept = [name for name in _COLUMNS[kind] if name in header]
     full = next((name for name in header if _is_column(name, column)), column)
+    if full in kept:
+        raise InputError(
+            f"{column} is a column that identifies students, so it cannot hold points. Give the "
+            f"name of the assignment: --column NAME."
+        )
     files_of: dict[int, list[Submission]] = {}
     messages = []
     for one in submissions:
@@ -170,7 +176,7 @@ def _is_points_row(row: Mapping[str, str]) -> bool:
 
 def _is_column(name: str, column: str) -> bool:
     """Return whether a header names an assignment; Canvas adds its number in parentheses."""
-    return name == column or (name.startswith(f"{column} (") and name.endswith(")"))
+    return re.fullmatch(rf"{re.escape(column)}( \(\d+\))?", name) is not None
 
 
 def _matches(kind: str, row: Mapping[str, str], submission: Submission) -> bool:

@@ -192,17 +192,16 @@ def grade_files(
             print(error, file=sys.stderr)
             unread += 1
     if before:
-        times = [time_of(one.time) for one in submissions]
-        submissions = [
-            one for one, time in zip(submissions, times, strict=True) if time and time <= before
-        ]
+        all_files, submissions = submissions, []
+        for one in all_files:
+            time = time_of(one.time)
+            if time and time <= before:
+                submissions.append(one)
+            else:
+                print(f"{one.file}: left out, written {one.time}.")
     if latest:
-        files_of: dict[str, list[Submission]] = {}
-        for one in submissions:
-            files_of.setdefault(one.student, []).append(one)
-        joined = [join_files(some) for some in files_of.values()]
-        submissions = [one for one, _ in joined]
-        for line in (line for _, lines in joined for line in lines):
+        submissions, messages = join_students(submissions)
+        for line in messages:
             print(line)
     if not submissions:
         raise InputError(
@@ -263,6 +262,15 @@ def join_files(files: Collection[Submission]) -> tuple[Submission, list[str]]:
         inventory={time: letters for one in files for time, letters in one.inventory.items()},
     )
     return joined, messages
+
+
+def join_students(files: Iterable[Submission]) -> tuple[list[Submission], list[str]]:
+    """Join the files of each student; see `join_files`."""
+    files_of: dict[str, list[Submission]] = {}
+    for one in files:
+        files_of.setdefault(one.student, []).append(one)
+    joined = [join_files(some) for some in files_of.values()]
+    return [one for one, _ in joined], [line for _, lines in joined for line in lines]
 
 
 def number_messages(submissions: Sequence[Submission], own_numbers: bool) -> list[str]:
@@ -350,7 +358,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]
     """Write a table as CSV. Only an unchanged table of an earlier grading is replaced."""
     data = _as_csv([header, *([_csv_safe(part) for part in row] for row in rows)])
     try:
-        if path.is_file() and not _is_table(path.read_bytes(), header):
+        if path.is_file() and not _is_table(read_file(path), header):
             raise InputError(
                 f"{path} is not an unchanged table of an earlier grading with these columns, so it "
                 f"is not replaced. Give another file: --table CSV."

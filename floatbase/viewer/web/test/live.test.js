@@ -194,10 +194,13 @@ test("both ends of every control are valid settings, and what is beyond them is 
   assert.ok(beyond >= 9);
 });
 
-test("the largest push of the slider is the largest push", () => {
+test("the largest push of the slider is the largest push in each direction", () => {
   const {high} = rangeOf("push", go2), push = {duration: 0.1, start: 0, at: [0, 0, 0], body: 1};
   assert.equal(high, 375);
-  checkPush({...push, force: [0, -high, 0]}, go2);
+  for (let towards = -180; towards <= 180; towards += 5) {
+    const angle = towards * Math.PI / 180;
+    checkPush({...push, force: [high * Math.cos(angle), high * Math.sin(angle), 0]}, go2);
+  }
   assert.throws(() => checkPush({...push, force: [1, high, 0]}, go2), /of at most 375/);
 });
 

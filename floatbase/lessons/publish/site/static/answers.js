@@ -3,6 +3,7 @@
 
 {
   const KEY = "floatbase-answers";
+  const NOT_STORED = " This browser cannot store your answer.";
   const SITE = new URL("..", document.currentScript.src || location.href); // script: in a folder of it
   const {due, isAnswer, isRight, numbersIn, within} = globalThis.floatbaseRules;
 
@@ -90,7 +91,7 @@
       const entry = {said, unit: data.unit, sure: sure.checked, is: data.result};
       show(entry);
       if (!store("predictions", data.name, {...entry, time: new Date().toISOString()})) {
-        message.append(" This browser cannot store your answer.");
+        message.append(NOT_STORED);
       }
       document.dispatchEvent(new Event("answers"));
     });
@@ -120,10 +121,11 @@
       if (answer === null) return;
       const right = judge(answer);
       const old = load().exercises[data.name] ?? {tries: 0, right: 0};
-      store("exercises", data.name, {
+      const entry = {
         tries: old.tries + 1, right: old.right + Number(right),
         answer: right || !old.right ? answer : old.answer,
-      });
+      };
+      if (!store("exercises", data.name, entry)) message.append(NOT_STORED);
       document.dispatchEvent(new Event("answers"));
     });
     if (before) {
@@ -216,7 +218,7 @@
         message.append(" Look it up in ", link, ".");
       }
       const entry = {recalled, knew, time: new Date().toISOString()};
-      if (!store("recalled", data.name, entry)) message.append(" This browser cannot store your answer.");
+      if (!store("recalled", data.name, entry)) message.append(NOT_STORED);
     });
     return form;
   };

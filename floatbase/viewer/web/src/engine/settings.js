@@ -6,6 +6,7 @@ import rows from "../../../../live/settings.json" with {type: "json"};
 const WEIGHT_PER_MASS = 9.81; // m/s²
 const FARTHEST = 10; // m: where a push can act, from the middle of a body
 const MOST_SHOWN = 40; // characters of a value in a message
+const ROUNDING = 1e-9; // of a vector that was made from its length and direction
 
 export {rows};
 
@@ -45,7 +46,7 @@ export const SWITCH = {words: "true or false", fits: (value) => typeof value ===
 const vectorRule = (most) => ({
   words: `a vector of three numbers${most < Infinity ? `, of at most ${most}` : ""}`,
   fits: (value) => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite)
-    && Math.hypot(...value) <= most,
+    && Math.hypot(...value) <= most * (1 + ROUNDING),
 });
 
 // Refuse a value that does not follow its rule.
