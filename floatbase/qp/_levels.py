@@ -21,8 +21,8 @@ def in_residuals(
     """Return the QP in y of a level at x + T y, the matrix T, and the number of y that cost.
 
     The columns of T span those of `free`, which are orthonormal. The first y are coordinates of the
-    weighted residuals. Their curvature is 1, whatever the weights are. The other y change no
-    residual.
+    weighted residuals. All their curvatures are equal, whatever the weights are, and no column is
+    longer than 1. The other y change no residual.
     """
     parts, size = [np.zeros((0, free.shape[1] + 1))], 0.0
     for block, weight, residual in costs:
@@ -33,19 +33,20 @@ def in_residuals(
     weighted = np.vstack(parts)
     U, s, Vt = np.linalg.svd(weighted[:, :-1])
     rank, n = int(np.sum(s > _RANK_TOLERANCE * size)), free.shape[1]
-    T = free @ np.hstack([Vt[:rank].T / s[:rank], Vt[rank:].T])
-    g, G = np.zeros(n), level.G @ T
-    g[:rank] = U[:, :rank].T @ weighted[:, -1]
+    unit = s[rank - 1] if rank else 1.0
+    columns = np.hstack([Vt[:rank].T * (unit / s[:rank]), Vt[rank:].T])
+    g, G = np.zeros(n), level.G @ free
+    g[:rank] = unit * (U[:, :rank].T @ weighted[:, -1])
     G[np.linalg.norm(G, axis=1) <= _ROW_TOLERANCE * level.row_norms] = 0.0
     change = InequalityQP(
-        np.diag(np.arange(n) < rank).astype(float),
+        np.diag(np.where(np.arange(n) < rank, unit**2, 0.0)),
         g,
         np.zeros((0, n)),
         np.zeros(0),
-        G,
+        G @ columns,
         level.h - level.G @ x,
         inequality_names=level.inequality_names,
         penalties=level.penalties,
         row_norms=level.row_norms,
     )
-    return change, T, rank
+    return change, free @ columns, rank

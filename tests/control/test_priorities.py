@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import cvxpy as cp
@@ -273,6 +274,21 @@ def check_levels(state: State, controller: fb.WholeBodyController) -> bool:
 def test_no_level_of_random_problems_can_be_improved(name, n):
     solved = sum(check_levels(*random_problem(name, seed)) for seed in range(n))
     assert solved > n / 3
+
+
+@pytest.mark.parametrize("factor", [1e-16, 1e16])
+def test_a_factor_of_all_weights_changes_no_answer(factor):
+    """Only the ratios of the weights in a level count, also for which rows are zero."""
+    robot = judges.load("go2")
+    contacts, limits = judges.stance(robot), JointLimits.of(robot, weight=None)
+    levels = levels_of(robot, robot.standing())
+    scaled = [[replace(task, weight=factor * task.weight) for task in level] for level in levels]
+    for state in judges.states("go2", 3, 0.05):
+        x, y = (
+            fb.WholeBodyController(robot, contacts, each, joint_limits=limits)(state.q, state.v)
+            for each in (levels, scaled)
+        )
+        assert np.allclose(x.tau, y.tau, rtol=0.0, atol=1e-6 * np.max(np.abs(x.tau)))
 
 
 def test_tasks_of_one_name_can_be_in_several_levels():
