@@ -328,12 +328,16 @@ def test_a_full_disk_leaves_a_compiled_tick_and_a_warning(small):
     assert "disk" not in small()
 
 
-def test_a_controller_waits_for_another_process_that_compiles_until_the_user_interrupts(small):
+def test_a_controller_waits_for_another_process_that_compiles_until_the_user_interrupts(
+    small, request
+):
     def interrupt() -> None:
         until(lambda: jit.waiting)
         time.sleep(0.1)  # s until the lock is requested
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by some test runners
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, former))
     small()
     with ThreadPoolExecutor(1) as other:
         with open(Path(tick.tick.stats.cache_path) / "compiling.lock", "a") as file:
