@@ -336,7 +336,8 @@ def test_a_controller_waits_for_another_process_that_compiles_until_the_user_int
         time.sleep(0.1)  # s until the lock is requested
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
-    former = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored by some test runners
+    # some test runners ignore interrupts
+    former = signal.signal(signal.SIGINT, signal.default_int_handler)
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, former))
     small()
     with ThreadPoolExecutor(1) as other:
