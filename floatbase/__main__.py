@@ -29,8 +29,8 @@ COURSE_COMMANDS = {
 _POLL_INTERVAL = 0.05  # s between checks for a connected page: short enough for a reader
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line, without the options of other programs."""
     parser = argparse.ArgumentParser(
         prog="floatbase", description="Control of floating-base robots."
     )
@@ -88,6 +88,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands.add_parser("doctor", help="show what is installed, what is missing, and how to get it")
     for name, text in COURSE_COMMANDS.items():
         commands.add_parser(name, help=text, add_help=False)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = _parser()
     options, further = parser.parse_known_args(arguments)
     if options.command is None:
         parser.print_help()
@@ -101,7 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"unrecognized arguments: {' '.join(further)}")
     given = sys.argv[1:] if arguments is None else arguments
     if options.command == "lab" and _folder_may_be_a_value(given[1:]):
-        lab.error("Name the folder first, and write options as in --port=9000.")
+        parser.error("Name the folder of `lab` first, and write options as in --port=9000.")
     try:
         return _run(options, further, given)
     except fb.FloatbaseError as error:

@@ -17,9 +17,9 @@ from floatbase.objectives import Task
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
 from floatbase.qp._levels import in_residuals
 
-# fraction of the largest slope that it balances: smaller multipliers may be rounding errors
-_SIGNIFICANT_MULTIPLIER = 1e-12
-_SIGNIFICANT_SLOPE = 1e6  # times the slope that is left at the optimum, likewise
+# A smaller multiplier may be a rounding error. The bounds are a fraction of the largest slope that
+# it balances, and a multiple of the slope that is left at the optimum.
+_SIGNIFICANT_MULTIPLIER, _SIGNIFICANT_SLOPE = 1e-12, 1e6
 
 
 def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
