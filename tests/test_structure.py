@@ -18,7 +18,7 @@ PACKAGE = Path(floatbase.__file__).parent
 ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
 LAYERS = """
-    conventions errors _validation _assets _browser _files _geometry affine linear_algebra
+    conventions errors _validation _assets _browser _files _geometry _locks affine linear_algebra
     qp
     robots
     dynamics
@@ -248,6 +248,11 @@ def test_modules_are_short_documented_and_finished():
         words = [word for word in ("TODO", "FIXME", "XXX") if word in source]
         wrong += [f"{relative(path)} contains {word}" for word in words]
     assert not wrong, "\n".join(wrong)
+
+
+def test_no_lock_stays_locked_after_an_interrupt():
+    calls = {relative(path): re.findall(r"\bLock\(\)", path.read_text("utf-8")) for path in MODULES}
+    assert not any(calls.values()), "use InterruptibleLock of floatbase._locks"
 
 
 def test_lines_of_javascript_are_at_most_100_characters_long():

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import html
 import math
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import ipywidgets as widgets
 
+from floatbase._locks import InterruptibleLock
 from floatbase._validation import (
     as_array,
     as_bool,
@@ -393,7 +393,7 @@ class _StatusLine(widgets.Label):
 
     def __init__(self, run: LiveSimulation):
         super().__init__(value=run.status)
-        self._run, self._news, self._telling = run, "", threading.Lock()
+        self._run, self._news, self._telling = run, "", InterruptibleLock()
 
     def show_status(self, news: str | None = None) -> None:
         """Show the present status."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import floatbase as fb
+from floatbase._locks import InterruptibleLock
 from floatbase._validation import as_bool, as_instance, as_number
 from floatbase.errors import FloatbaseError, ViewerError, unknown_name
 from floatbase.live.settings import SETTINGS
@@ -93,8 +93,8 @@ class Playground:
         self._last_change: tuple[frozenset[str], float] = (frozenset(), -math.inf)  # fields, time
         self._requested: dict[str, Any] = {}
         self._applying: dict[str, Any] = {}  # what is being applied now
-        self._lock = threading.Lock()  # protects the requests
-        self._drawing_lock = threading.Lock()  # the run and a thread that pauses it both draw
+        self._lock = InterruptibleLock()  # protects the requests
+        self._drawing_lock = InterruptibleLock()  # the run and a thread that pauses it both draw
         session = self.session
         self.run = LiveSimulation(
             session.sim, session.controller, self._on_slice, control_period=PERIOD,

@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy.typing as npt
 
+from floatbase._locks import InterruptibleLock
 from floatbase._validation import as_callable, as_instance, as_positive
 from floatbase.simulation.after_fall import is_at_rest, settling_rollout
 from floatbase.simulation.physics import Simulation
@@ -90,7 +91,7 @@ class LiveSimulation:
         self._idle_timeout = as_positive("idle_timeout", idle_timeout, "s")
         self._push_memory = as_positive("push_memory", push_memory, "s", allow_zero=True)
         self._time_scale = 1.0
-        self._lock = threading.Lock()  # protects all attributes below
+        self._lock = InterruptibleLock()  # protects all attributes below
         self._pushes: tuple[Push, ...] = ()  # of the last slice
         self._requested_pushes: list[Push] = []  # for the next one
         self._reset_requested = False

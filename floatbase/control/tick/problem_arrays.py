@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from functools import lru_cache
-from threading import Lock
 from typing import Any, ClassVar, TypeAlias, cast
 from weakref import WeakSet
 
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from floatbase._locks import InterruptibleLock
 from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
@@ -49,7 +49,7 @@ class Dynamics:
     def __init__(self, robot: Robot):
         self.robot = robot
         self.data = robot.model.createData()
-        self.lock = Lock()
+        self.lock = InterruptibleLock()
         self._all.add(self)
         model, data, n = robot.model, self.data, robot.model.njoints
         poses = np.lib.stride_tricks.as_strided(
@@ -83,7 +83,7 @@ class Dynamics:
         In a forked process no thread is left to release a lock that another thread held.
         """
         for dynamics in cls._all:
-            dynamics.lock = Lock()
+            dynamics.lock = InterruptibleLock()
 
 
 if hasattr(os, "register_at_fork"):

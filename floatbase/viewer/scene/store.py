@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable
 from typing import Any
 
 import msgpack
 
+from floatbase._locks import InterruptibleLock
 from floatbase.errors import ViewerError
 from floatbase.viewer.scene.protocol import Key, Update, checked_control_value, encode
 
@@ -18,7 +18,7 @@ class Scene:
     def __init__(self) -> None:
         self.newest = 0
         self.sent_to_all = 0
-        self._lock = threading.Lock()
+        self._lock = InterruptibleLock()
         self._entries: dict[Key, tuple[int, bytes]] = {}
 
     def put(self, updates: Iterable[Update]) -> int:

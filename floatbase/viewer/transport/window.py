@@ -7,13 +7,13 @@ process, which listens on all interfaces, outlives the kernel, and waits for a b
 from __future__ import annotations
 
 import socket
-import threading
 import weakref
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import tornado.netutil
 
+from floatbase._locks import InterruptibleLock
 from floatbase._validation import short_repr
 from floatbase.errors import ViewerError
 from floatbase.viewer.scene import protocol
@@ -33,7 +33,7 @@ class Window:
         self.scene = Scene()
         sockets = _bound_sockets(port) if _checked_port(port) else []
         self._server = Server(self.scene)
-        self._opening = threading.Lock()
+        self._opening = InterruptibleLock()
         self._newest_display: Callable[[], NotebookWidget | None] = lambda: None
         if sockets:
             self._server.listen(sockets)
