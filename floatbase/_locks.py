@@ -12,7 +12,7 @@ class InterruptibleLock(_thread.RLock):  # type: ignore[misc]
     Since Python 3.14, an interrupt may come after a lock is acquired and before `with` guards it.
     """
 
-    def __enter__(self) -> bool:
+    def __enter__(self) -> bool:  # type: ignore[override]
         try:
             return self.acquire()
         except BaseException:
