@@ -370,10 +370,9 @@ def check_couplings(name: str, urdf: str) -> None:
         joint, master = next(iter(masters.items()))
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
-            f"Joints of {name} are coupled by <mimic>: {joint} mimics {master}, and "
-            f"{len(masters) - 1} more. Eqs. (1)-(7) need a separate motor for every joint. Lock "
-            f"these joints with locked={coupled}, or remove <mimic> from the URDF if they do have "
-            f"separate motors."
+            f"Joints of {name} are coupled by <mimic>, such as {joint} to {master}. Eqs. (1)-(7) "
+            f"need a separate motor for every joint. Lock these joints with locked={coupled}, or "
+            f"remove <mimic> from the URDF if they do have separate motors."
         )
 
 
