@@ -151,7 +151,7 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
-    if not options.robot.lower().endswith((".urdf", ".xml")):
+    if not options.robot.lower().endswith((".urdf", ".xml", ".xacro", ".sdf")):
         return fb.load(options.robot)
     return fb.load_urdf(
         options.robot,

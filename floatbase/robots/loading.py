@@ -32,11 +32,12 @@ from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 from floatbase.robots.urdf import (
-    check_urdf,
+    check_couplings,
+    check_model,
+    normalize_urdf,
     parse_urdf,
     read_urdf,
     with_locked_joints,
-    without_world_link,
 )
 
 # width and thickness, m, of the plate on which `with_floating_base` places a robot
@@ -119,7 +120,7 @@ def load(
     entry = CATALOGUE.get(name, CatalogueEntry(""))
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
     root = Path(data.getModelPath(path)).resolve()
-    urdf = read_urdf(root / path)
+    urdf = normalize_urdf(name, read_urdf(root / path), loader.free_flyer)
     model = parse_urdf(name, urdf, loader.free_flyer)
     srdf = (
         root / loader.path / loader.srdf_subpath / loader.srdf_filename
@@ -181,7 +182,8 @@ def load_urdf(
         Name of the robot. By default the file name without its extension, or "robot" if the text is
         given.
     floating : bool, optional
-        Whether the root link can move freely.
+        Whether the base can move freely. The base is then the first link with mass: links without
+        mass below it, such as "world", are removed, together with a floating joint.
     package_dirs : sequence of str or Path, optional
         Folders that contain meshes named package://…; the folder of the file is always searched.
     feet : sequence of str or Foot, optional
@@ -212,8 +214,14 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture, or if no posture is
-        given and a leg of a floating-base robot is straight or otherwise singular.
+        If the motors of a fixed-base robot are too weak to hold its posture, if no posture is
+        given and a leg of a floating-base robot is straight or otherwise singular, if only some
+        joints have a torque limit, or if the URDF has settings for MuJoCo, which are ignored.
+
+    Notes
+    -----
+    `Robot.urdf` is not the text of the file. It holds the links, joints and materials alone, in a
+    form that Pinocchio and MuJoCo read in the same way.
     """
     urdf = as_string("path", str(path) if isinstance(path, Path) else path)
     directories = _as_directories(package_dirs)
@@ -233,6 +241,7 @@ def load_urdf(
                     f'fb.load("{urdf}").'
                 )
         urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
+    urdf = normalize_urdf(name, urdf, floating)
     model = parse_urdf(name, urdf, floating)
     start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
     robot = _make_robot(
@@ -248,6 +257,8 @@ def load_urdf(
     _warn_if_motors_are_weak(robot)
     if posture is None:
         _warn_if_legs_are_singular(robot)
+    if torque_limits is None:
+        _warn_if_joints_are_passive(robot)
     return robot
 
 
@@ -264,8 +275,8 @@ def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
 def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     """Free the base of a fixed-base robot.
 
-    The links and joints of the URDF stay the same. The link "world", which some URDFs have below
-    the base, and the joints attached to it are removed.
+    The links and joints of the URDF stay the same, except for links without mass below the base,
+    such as "world".
 
     Parameters
     ----------
@@ -292,7 +303,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
             f"a fixed base, such as ur5."
         )
     floating = load_urdf(
-        without_world_link(robot.urdf),
+        robot.urdf,
         name=robot.name,
         package_dirs=robot.package_dirs,
         torque_limits=robot.torque_limits,
@@ -341,7 +352,8 @@ def _make_robot(
         model.armature = np.array(
             [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
         )
-    check_urdf(name, urdf, model)
+    check_couplings(name, urdf)
+    check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
@@ -375,6 +387,21 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
+def _warn_if_joints_are_passive(robot: Robot) -> None:
+    """Warn if only some joints have a torque limit in the URDF: the others may have no motor.
+
+    The warning points at the code that called the loading function.
+    """
+    unlimited = np.array(robot.joint_names)[np.isinf(robot.torque_limits)].tolist()
+    if 0 < len(unlimited) < robot.d:
+        message = (
+            f"The URDF of {robot.name} gives no effort, or effort=0, for {', '.join(unlimited)}. "
+            f"Their motors have no torque limits. If these joints are passive, for example in a "
+            f"closed loop, lock them with locked=[…]. Otherwise, pass torque_limits."
+        )
+        warnings.warn(message, RobotWarning, stacklevel=3)
+
+
 def _warn_if_legs_are_singular(robot: Robot) -> None:
     """Warn if a foot of a floating-base robot moves in fewer directions than with a bent leg.
 
@@ -400,7 +427,7 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
             f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
             f"The legs of {', '.join(singular)} are then singular, for example straight, and "
             f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
-            f"load_urdf: {robot.d} joint positions."
+            f"load_urdf: {robot.nq - 7} joint positions."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 
