@@ -1,4 +1,4 @@
-"""Loading robots: the catalogue, other robots of example-robot-data, and your own URDFs.
+"""Loading robots: the catalogue, other robots of example-robot-data, your own URDFs and MJCFs.
 
 Robots of example-robot-data that are not in the catalogue need their feet to be given.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,13 +35,14 @@ from floatbase.robots.state import State
 from floatbase.robots.urdf import (
     check_urdf,
     parse_urdf,
-    read_urdf,
+    read_text,
     with_locked_joints,
     without_world_link,
 )
 
 # width and thickness, m, of the plate on which `with_floating_base` places a robot
 PLATE_SIZE = (0.4, 0.03)
+FILE_ENDINGS = (".urdf", ".xml", ".mjcf")
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
@@ -62,7 +64,7 @@ def catalogue() -> dict[str, str]:
 
 
 def load(
-    name: str,
+    name: str | Path,
     *,
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
@@ -74,8 +76,9 @@ def load(
 
     Parameters
     ----------
-    name : str
-        One of `catalogue()`, or any other robot of example-robot-data that has a URDF.
+    name : str or Path
+        One of `catalogue()`, any other robot of example-robot-data that has a URDF, or the path of
+        a file, which `load_urdf` or `load_mjcf` loads.
     feet : sequence of str or Foot, optional
         Frames or `Foot` values that can touch the ground; by default those of the catalogue.
         Floating-base robots outside the catalogue require them.
@@ -115,11 +118,21 @@ def load(
     """
     import example_robot_data as data
 
+    if str(name).lower().endswith(FILE_ENDINGS):
+        return file_loader(str(name))(
+            name,
+            feet=() if feet is None else feet,
+            foot_radius=foot_radius,
+            torque_limits=torque_limits,
+            posture=posture,
+            locked=locked,
+        )
+    name = str(name) if isinstance(name, Path) else name
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
     root = Path(data.getModelPath(path)).resolve()
-    urdf = read_urdf(root / path)
+    urdf = read_text(root / path)
     model = parse_urdf(name, urdf, loader.free_flyer)
     srdf = (
         root / loader.path / loader.srdf_subpath / loader.srdf_filename
@@ -157,6 +170,15 @@ def load(
     )
     _warn_if_motors_are_weak(robot)
     return robot
+
+
+def file_loader(path: str) -> Callable[..., Robot]:
+    """Return `load_urdf` or `load_mjcf`, according to the outermost element of a file."""
+    try:
+        tag = ElementTree.fromstring(read_text(Path(os.path.expanduser(path)))).tag
+    except ElementTree.ParseError:
+        tag = ""  # load_urdf describes the error
+    return load_mjcf if tag == "mujoco" else load_urdf
 
 
 def load_urdf(
@@ -232,7 +254,7 @@ def load_urdf(
                     f"There is no file {urdf}, but there is a robot with this name. Load it with "
                     f'fb.load("{urdf}").'
                 )
-        urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
+        urdf, directories = read_text(file), (*directories, file.resolve().parent)
     model = parse_urdf(name, urdf, floating)
     start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
     robot = _make_robot(
@@ -245,6 +267,110 @@ def load_urdf(
         package_dirs=directories,
         feet=_as_feet(feet, foot_radius),
     )
+    _warn_if_motors_are_weak(robot)
+    if posture is None:
+        _warn_if_legs_are_singular(robot)
+    return robot
+
+
+def load_mjcf(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    floating: bool | None = None,
+    feet: Sequence[str | Foot] = (),
+    foot_radius: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | str | None = None,
+    locked: Sequence[str] = (),
+) -> Robot:
+    """Load your own robot from an MJCF, the file format of MuJoCo.
+
+    MuJoCo compiles the file. `Robot.urdf` is then a URDF of the robot in it: of the free body with
+    the most joints, or of everything that is attached to the world. Bodies, sites and named
+    geoms that can touch others are links. Rotor inertias (armature) become part of M.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path of the MJCF file, or the text of the MJCF itself.
+    name : str, optional
+        Name of the robot. By default the file name without its extension, or "robot" if the text is
+        given.
+    floating : bool, optional
+        Whether the base can move freely; by default, whether it has a free joint in the file. With
+        True, a free joint replaces the joints between the base and the world.
+    feet : sequence of str or Foot, optional
+        Bodies, sites, geoms or `Foot` values that can touch the ground; none by default.
+    foot_radius : float, optional
+        Radius of the feet that are given as names [m]; 0 by default.
+    torque_limits : float or array_like, shape (d,), optional
+        Torque limits [N·m]; by default what the actuators and joints of the file allow.
+    posture : str or array_like, shape (nq,) or (nq - 7,), optional
+        Standing configuration of the robot before joints are locked: the name of a keyframe, or
+        numbers as in `load_urdf`. By default the first keyframe, or the file's initial
+        configuration, with joints brought within their limits.
+    locked : sequence of str, optional
+        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
+
+    Returns
+    -------
+    Robot
+        The robot.
+
+    Raises
+    ------
+    UnknownNameError
+        If a keyframe, a foot or a locked joint does not exist.
+    InputError
+        If MuJoCo cannot read the file, if the robot has ball joints, if the base cannot float, or
+        for the same reasons as in `load_urdf`.
+
+    Warns
+    -----
+    RobotWarning
+        If the file contains parts that the robot does not have, such as tendons, springs,
+        constraints and other free bodies, or for the same reasons as in `load_urdf`.
+
+    Examples
+    --------
+    >>> robot = fb.load_mjcf(
+    ...     "<mujoco><worldbody><body name='ball'><freejoint/><geom size='0.1'/></body></worldbody>"
+    ...     "</mujoco>"
+    ... )
+    >>> robot.base
+    'ball'
+    """
+    from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
+
+    source: str | Path = as_string("path", str(path) if isinstance(path, Path) else path)
+    if floating is not None:
+        as_bool("floating", floating)
+    is_text = str(source).lstrip(_WHITESPACE).startswith("<")
+    source = str(source).lstrip(_WHITESPACE) if is_text else Path(os.path.expanduser(source))
+    default_name = source.stem if isinstance(source, Path) else "robot"
+    name = default_name if name is None else as_string("name", name)
+    mjcf = read_mjcf(name, source, floating)
+    model = parse_urdf(name, mjcf.urdf, mjcf.is_floating if floating is None else floating)
+    model.armature = mjcf.armature(model)
+    start: npt.ArrayLike = (
+        clamp_to_limits(model, mjcf.posture(model, posture))
+        if posture is None or isinstance(posture, str)
+        else posture
+    )
+    robot = _make_robot(
+        name,
+        mjcf.urdf,
+        model,
+        start,
+        locked,
+        torque_limits,
+        package_dirs=(mjcf.folder,),
+        feet=_as_feet(feet, foot_radius),
+    )
+    if mjcf.differences:
+        message = f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."
+        warnings.warn(message, RobotWarning, stacklevel=2)
     _warn_if_motors_are_weak(robot)
     if posture is None:
         _warn_if_legs_are_singular(robot)
@@ -408,12 +534,11 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """Return the entry of a robot in example-robot-data."""
     text = str(name) if isinstance(name, str | Path) else ""
-    if text.endswith((".urdf", ".xml", ".xacro")) or "/" in text:
-        path = short_repr(text)
+    if text.endswith(".xacro") or "/" in text:
         raise UnknownNameError(
-            f"{path} is the name of a file, not of a robot. Load your own URDF with "
-            f"fb.load_urdf({path}, feet=[…]). fb.load accepts {', '.join(CATALOGUE)}, and the "
-            f"other names of example-robot-data."
+            f"{short_repr(text)} is the name of a file, but not of a URDF or MJCF file: their "
+            f"names end in {', '.join(FILE_ENDINGS)}. fb.load also accepts {', '.join(CATALOGUE)}, "
+            f"and the other names of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:
         raise unknown_name(

@@ -21,15 +21,16 @@ _LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # joint types that need a <lim
 _ROUNDING = 1e-12
 
 
-def read_urdf(path: Path) -> str:
-    """Read the text of a URDF file."""
+def read_text(path: Path) -> str:
+    """Read the text of a URDF or MJCF file."""
     try:
         # a comment in another encoding does not change the robot
         return read_file(path).decode("utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF file."
+            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF or "
+            f"MJCF file."
         ) from None
 
 
@@ -53,7 +54,8 @@ def _parse_error(urdf: str, error: Exception) -> str:
         return str(error)
     root = ElementTree.fromstring(urdf)
     if root.tag != "robot":
-        return f"its outermost element is <{root.tag}>, but it must be <robot>."
+        advice = " Load it with fb.load_mjcf." if root.tag == "mujoco" else ""
+        return f"its outermost element is <{root.tag}>, but it must be <robot>.{advice}"
     for kind in ("link", "joint"):
         for duplicate, count in Counter(
             element.get("name") for element in root.findall(kind)
@@ -180,8 +182,8 @@ def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> 
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
             f"Joints of {name} are coupled: {pairs}. Eqs. (1)-(7) need a separate motor for every "
-            f"joint. Lock these joints with locked={coupled}, or remove <mimic> from the URDF if "
-            f"they do have separate motors."
+            f"joint. Lock these joints with locked={coupled}. If they do have separate motors, "
+            f"remove <mimic> from the URDF or <equality> from the MJCF."
         )
 
 
