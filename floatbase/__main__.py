@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import floatbase as fb
-from floatbase.robots.loading import FILE_ENDINGS, file_loader
+from floatbase.robots import file_loader
 
 if TYPE_CHECKING:
     from floatbase.playground import Playground
@@ -136,12 +136,11 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
-    if not options.robot.lower().endswith(FILE_ENDINGS):
+    load_file = file_loader(options.robot)
+    if load_file is None:
         return fb.load(options.robot)
     fixed = {"floating": False} if options.fixed else {}
-    return file_loader(options.robot)(
-        options.robot, feet=options.feet, foot_radius=options.foot_radius, **fixed
-    )
+    return load_file(options.robot, feet=options.feet, foot_radius=options.foot_radius, **fixed)
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:

@@ -9,7 +9,6 @@ import os
 import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,9 @@ import pinocchio as pin
 from floatbase._validation import (
     Array,
     as_bool,
-    as_instance,
     as_positive,
     as_string,
     as_strings,
-    read_only,
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
@@ -37,19 +34,15 @@ from floatbase.robots.urdf import (
     parse_urdf,
     read_text,
     with_locked_joints,
-    without_world_link,
 )
 
-# width and thickness, m, of the plate on which `with_floating_base` places a robot
-PLATE_SIZE = (0.4, 0.03)
-FILE_ENDINGS = (".urdf", ".xml", ".mjcf")
+_FILE_ENDINGS = (".urdf", ".xml", ".mjcf")
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
 
 def catalogue() -> dict[str, str]:
@@ -118,16 +111,17 @@ def load(
     """
     import example_robot_data as data
 
-    if str(name).lower().endswith(FILE_ENDINGS):
-        return file_loader(str(name))(
+    name = str(name) if isinstance(name, Path) else name
+    load_file = file_loader(name)
+    if load_file is not None:
+        return load_file(
             name,
-            feet=() if feet is None else feet,
+            feet=feet or (),
             foot_radius=foot_radius,
             torque_limits=torque_limits,
             posture=posture,
             locked=locked,
         )
-    name = str(name) if isinstance(name, Path) else name
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
@@ -172,8 +166,21 @@ def load(
     return robot
 
 
-def file_loader(path: str) -> Callable[..., Robot]:
-    """Return `load_urdf` or `load_mjcf`, according to the outermost element of a file."""
+def file_loader(path: str) -> Callable[..., Robot] | None:
+    """Choose the function that loads a robot's file, according to its outermost element.
+
+    Parameters
+    ----------
+    path : str
+        Path of a file, or the name of a robot.
+
+    Returns
+    -------
+    callable or None
+        `load_urdf` or `load_mjcf`; None unless the path ends like a URDF or MJCF file.
+    """
+    if not isinstance(path, str) or not path.lower().endswith(_FILE_ENDINGS):
+        return None
     try:
         tag = ElementTree.fromstring(read_text(Path(os.path.expanduser(path)))).tag
     except ElementTree.ParseError:
@@ -293,10 +300,9 @@ def load_mjcf(
     Parameters
     ----------
     path : str or Path
-        Path of the MJCF file, or the text of the MJCF itself.
+        Path of the MJCF file.
     name : str, optional
-        Name of the robot. By default the file name without its extension, or "robot" if the text is
-        given.
+        Name of the robot. By default the file name without its extension.
     floating : bool, optional
         Whether the base can move freely; by default, whether it has a free joint in the file. With
         True, a free joint replaces the joints between the base and the world.
@@ -331,38 +337,22 @@ def load_mjcf(
     RobotWarning
         If the file contains parts that the robot does not have, such as tendons, springs,
         constraints and other free bodies, or for the same reasons as in `load_urdf`.
-
-    Examples
-    --------
-    >>> robot = fb.load_mjcf(
-    ...     "<mujoco><worldbody><body name='ball'><freejoint/><geom size='0.1'/></body></worldbody>"
-    ...     "</mujoco>"
-    ... )
-    >>> robot.base
-    'ball'
     """
     from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
 
-    source: str | Path = as_string("path", str(path) if isinstance(path, Path) else path)
+    file = Path(
+        os.path.expanduser(as_string("path", str(path) if isinstance(path, Path) else path))
+    )
     if floating is not None:
         as_bool("floating", floating)
-    is_text = str(source).lstrip(_WHITESPACE).startswith("<")
-    source = str(source).lstrip(_WHITESPACE) if is_text else Path(os.path.expanduser(source))
-    default_name = source.stem if isinstance(source, Path) else "robot"
-    name = default_name if name is None else as_string("name", name)
-    mjcf = read_mjcf(name, source, floating)
-    model = parse_urdf(name, mjcf.urdf, mjcf.is_floating if floating is None else floating)
-    model.armature = mjcf.armature(model)
-    start: npt.ArrayLike = (
-        clamp_to_limits(model, mjcf.posture(model, posture))
-        if posture is None or isinstance(posture, str)
-        else posture
-    )
+    name = file.stem if name is None else as_string("name", name)
+    keyframe = posture if isinstance(posture, str) else None
+    mjcf = read_mjcf(name, file, floating, keyframe)
     robot = _make_robot(
         name,
         mjcf.urdf,
-        model,
-        start,
+        mjcf.model,
+        mjcf.posture if posture is None or isinstance(posture, str) else posture,
         locked,
         torque_limits,
         package_dirs=(mjcf.folder,),
@@ -385,58 +375,6 @@ def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
         else paths
     )
     return tuple(map(Path, as_strings("package_dirs", strings)))
-
-
-def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
-    """Free the base of a fixed-base robot.
-
-    The links and joints of the URDF stay the same. The link "world", which some URDFs have below
-    the base, and the joints attached to it are removed.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot with a fixed base, such as ur5.
-    plate : bool, optional
-        Whether the robot stands on a massless square plate of size `PLATE_SIZE`. Otherwise it
-        touches nothing and floats 1 m above the ground.
-
-    Returns
-    -------
-    Robot
-        The robot with a floating base.
-
-    Raises
-    ------
-    InputError
-        If the base is already floating.
-    """
-    as_bool("plate", plate)
-    if as_instance("robot", robot, Robot, 'fb.load("ur5")').is_floating:
-        raise InputError(
-            f"The base of {robot.name} is already floating. with_floating_base needs a robot with "
-            f"a fixed base, such as ur5."
-        )
-    floating = load_urdf(
-        without_world_link(robot.urdf),
-        name=robot.name,
-        package_dirs=robot.package_dirs,
-        torque_limits=robot.torque_limits,
-    )
-    width, thickness = PLATE_SIZE
-    corners = np.array(
-        [
-            [x * width, y * width, -thickness]
-            for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
-        ]
-    )
-    return replace(
-        floating,
-        feet=(Foot(floating.base, corners=corners),) if plate else (),
-        posture=read_only(
-            [0.0, 0.0, thickness if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]
-        ),
-    )
 
 
 def _make_robot(
@@ -533,12 +471,12 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """Return the entry of a robot in example-robot-data."""
-    text = str(name) if isinstance(name, str | Path) else ""
+    text = name if isinstance(name, str) else ""
     if text.endswith(".xacro") or "/" in text:
         raise UnknownNameError(
-            f"{short_repr(text)} is the name of a file, but not of a URDF or MJCF file: their "
-            f"names end in {', '.join(FILE_ENDINGS)}. fb.load also accepts {', '.join(CATALOGUE)}, "
-            f"and the other names of example-robot-data."
+            f"{short_repr(text)} is the name of a file, but names of URDF and MJCF files end in "
+            f"{', '.join(_FILE_ENDINGS)}. fb.load also accepts {', '.join(CATALOGUE)}, and the "
+            f"other names of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:
         raise unknown_name(

@@ -182,8 +182,8 @@ def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> 
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
             f"Joints of {name} are coupled: {pairs}. Eqs. (1)-(7) need a separate motor for every "
-            f"joint. Lock these joints with locked={coupled}. If they do have separate motors, "
-            f"remove <mimic> from the URDF or <equality> from the MJCF."
+            f"joint. Lock these joints with locked={coupled}, or remove <mimic> from the URDF if "
+            f"they do have separate motors."
         )
 
 

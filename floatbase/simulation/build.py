@@ -216,17 +216,13 @@ def _move_joint_of_massless_link(
     if not body.joints or _fused_inertia(link).mass > 0.0:
         return
     to_body = pin.SE3(rotation_matrix(body.quat), np.array(body.pos)).inverse()
-    joints = [(joint, to_body) for joint in link.joints]
-    joints += [(joint, pin.SE3.Identity()) for joint in body.joints]
-    moved = [
-        {
-            "pos": placement.act(np.array(joint.pos)),
-            "axis": placement.rotation @ joint.axis,
-            **{name: copy.copy(getattr(joint, name)) for name in _JOINT_ATTRIBUTES},
-        }
-        for joint, placement in joints
-    ]
-    for joint, _ in joints:
+    moved = []
+    for joint in (*link.joints, *body.joints):
+        placement = to_body if joint.parent.name == link.name else pin.SE3.Identity()
+        attributes = {name: copy.copy(getattr(joint, name)) for name in _JOINT_ATTRIBUTES}
+        attributes["pos"] = placement.act(np.array(joint.pos))
+        attributes["axis"] = placement.rotation @ joint.axis
+        moved.append(attributes)
         spec.delete(joint)
     for attributes in moved:
         body.add_joint(**attributes)
