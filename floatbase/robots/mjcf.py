@@ -48,9 +48,9 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
 
     The posture is that of the keyframe, by default that of the first one or the initial one.
     """
-    folder = file.resolve().parent
+    folder, text = file.resolve().parent, read_text(file)
     try:
-        tag = ElementTree.fromstring(read_text(file)).tag
+        tag = ElementTree.fromstring(text).tag
         if tag != "mujoco":
             advice = " Load it with fb.load_urdf." if tag == "robot" else ""
             raise ValueError(f"its outermost element is <{tag}>, but it must be <mujoco>.{advice}")
@@ -93,6 +93,13 @@ def _drop_what_is_missing(spec: mujoco.MjSpec, folder: Path) -> list[str]:
         if mesh.file and not _mesh_path(spec, mesh, folder).is_file()
     }
     for geom in list(spec.geoms):
+        body = geom.parent
+        has_mass = not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0
+        if geom.meshname in missing and has_mass and body.name != "world":
+            raise ValueError(
+                f"the mass of body {body.name!r} depends on the mesh {geom.meshname!r}, whose file "
+                f"is missing. Provide the file, or give the body an <inertial>."
+            )
         if geom.meshname in missing or geom.type == _Geom.mjGEOM_HFIELD:
             spec.delete(geom)
     names = {geom.name for geom in spec.geoms}
@@ -275,7 +282,9 @@ class _Writer:
             path = _mesh_path(self._spec, asset, self._folder)
             is_moved = asset.refpos.any() or asset.refquat[0] != 1.0
             if asset.file and path.suffix.lower() in _MESH_FILES and not is_moved:
-                file = quoteattr(f"package://{os.path.relpath(path, self._folder)}")
+                file = quoteattr(
+                    f"package://{Path(os.path.relpath(path, self._folder)).as_posix()}"
+                )
                 # MuJoCo moves the origin of a mesh to its centre of mass
                 centre = _placement(model.mesh_pos[mesh], model.mesh_quat[mesh])
                 shape = f"<mesh filename={file} scale='{_text(asset.scale)}'/>"

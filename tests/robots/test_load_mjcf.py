@@ -153,9 +153,10 @@ def test_shapes_of_the_file_are_drawn_and_can_lie_on_the_ground(tmp_path):
         assert np.allclose(points.min(axis=0), expected.min(axis=0), atol=1e-6)
         assert np.allclose(points.max(axis=0), expected.max(axis=0), atol=1e-6)
     (tmp_path / "parts" / "wedge.obj").unlink()
-    ball = '<geom size="0.1"/></body>'
     path = tmp_path / "wedge.xml"
-    path.write_text(path.read_text().replace("</body>", ball))
+    path.write_text(path.read_text().replace("</body>", "<geom size='0.1'/></body>"))
+    refused(lambda: fb.load_mjcf(path), InputError, "stone", "wedge")
+    path.write_text(path.read_text().replace('type="mesh"', 'type="mesh" mass="0"'))
     with warns(RobotWarning, "wedge"):
         assert fb.load_mjcf(path).mass > 0.0
 
