@@ -53,6 +53,8 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
         package_dirs=robot.package_dirs,
         torque_limits=robot.torque_limits,
     )
+    model = floating.model.copy()
+    model.armature = np.concatenate([np.zeros(6), robot.model.armature])  # not in the URDF
     width, thickness = PLATE_SIZE
     corners = np.array(
         [
@@ -62,6 +64,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     )
     return replace(
         floating,
+        model=model,
         feet=(Foot(floating.base, corners=corners),) if plate else (),
         posture=read_only(
             [0.0, 0.0, thickness if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]

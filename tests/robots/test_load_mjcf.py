@@ -13,6 +13,7 @@ from messages import refused, warns
 
 import floatbase as fb
 from floatbase.errors import InputError, RobotWarning, UnknownNameError
+from floatbase.robots import with_floating_base
 from floatbase.viewer.scene.meshes import robot_meshes
 
 LEG = """
@@ -204,6 +205,17 @@ def test_what_the_robot_does_not_have_is_named(load, mjcf, named):
     with warnings.catch_warnings():
         warnings.simplefilter("error", RobotWarning)
         load(pendulum())
+
+
+def test_an_arm_keeps_its_rotor_inertias_when_it_is_locked_or_set_free(load):
+    arm = f"""<mujoco><worldbody><body name="foot"><geom size="0.1"/>
+      {4 * '<body pos="0 0 1"><joint axis="0 1 0" armature="0.3"/><geom size="0.1"/>'}
+      {4 * "</body>"}</body></worldbody></mujoco>"""
+    fixed = load(arm)
+    free = with_floating_base(fixed)
+    assert (free.base, free.d) == ("foot", 4)
+    assert np.allclose(free.neutral().M[6:, 6:], fixed.neutral().M)
+    assert load(arm, locked=["joint_1"]).model.armature.tolist() == [0.3, 0.3, 0.3]
 
 
 def test_what_cannot_be_read_is_refused(load, tmp_path):
