@@ -94,7 +94,7 @@ class Foot(Value):
 class Robot(Value):
     """A robot model with feet, torque limits and a standing posture.
 
-    Use `load` or `load_urdf` to make one. A robot is immutable.
+    Use `load`, `load_urdf` or `load_mjcf` to make one. A robot is immutable.
 
     Parameters
     ----------

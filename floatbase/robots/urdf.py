@@ -66,15 +66,16 @@ _OTHER_FORMATS = {
 _ROUNDING = 1e-12
 
 
-def read_urdf(path: Path) -> str:
-    """Read the text of a URDF file."""
+def read_text(path: Path) -> str:
+    """Read the text of a URDF or MJCF file."""
     try:
         # a comment in another encoding does not change the robot
         return read_file(path).decode("utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF file."
+            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF or "
+            f"MJCF file."
         ) from None
 
 

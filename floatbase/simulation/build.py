@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -51,6 +51,8 @@ _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero
 # relative: for a thin plate the triangle inequality of principal inertias is an equality, up to
 # rounding
 _RELATIVE_ROUNDING = 1e-9
+
+_JOINT_ATTRIBUTES = ("name", "type", "range", "limited", "actfrcrange", "actfrclimited")
 
 
 def build_model(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjModel:
@@ -178,6 +180,8 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         ) from None
     spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
+    for body in bodies:
+        _move_joint_of_massless_link(spec, body, {body_name(foot.frame) for foot in robot.feet})
     inertias = {
         body.name: _fused_inertia(body)
         for body in bodies
@@ -200,6 +204,31 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
+
+
+def _move_joint_of_massless_link(
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, feet: Collection[str]
+) -> None:
+    """Let the joint of a massless link between two joints move the next link instead.
+
+    MuJoCo moves no body without mass, but several joints can move one body in succession.
+    """
+    if not link.joints or len(link.bodies) != 1 or link.name in feet:
+        return
+    body = link.bodies[0]
+    if not body.joints or _fused_inertia(link).mass > 0.0:
+        return
+    to_body = pin.SE3(rotation_matrix(body.quat), np.array(body.pos)).inverse()
+    moved = []
+    for joint in (*link.joints, *body.joints):
+        placement = to_body if joint.parent.name == link.name else pin.SE3.Identity()
+        attributes = {name: copy.copy(getattr(joint, name)) for name in _JOINT_ATTRIBUTES}
+        attributes["pos"] = placement.act(np.array(joint.pos))
+        attributes["axis"] = placement.rotation @ joint.axis
+        moved.append(attributes)
+        spec.delete(joint)
+    for attributes in moved:
+        body.add_joint(**attributes)
 
 
 def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:

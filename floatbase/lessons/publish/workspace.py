@@ -49,8 +49,7 @@ def prepare_workspace(folder: Path = NOTEBOOKS, mine: Path | None = None) -> lis
     except OSError as error:
         reason = "it is a file" if mine.is_file() else error.strerror
         raise InputError(
-            f"The folder {mine} cannot be created: {reason}. Choose one that you can write "
-            f"to."
+            f"The folder {mine} cannot be created: {reason}. Choose one that you can write to."
         ) from None
     record, messages = read_record(mine), []
     one_file = folder.parent.glob("examples/wbc.py")  # the end of lesson 07 names it
