@@ -501,7 +501,7 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """Return the entry of a robot in example-robot-data."""
     text = name if isinstance(name, str) else ""
-    if text.endswith(".xacro") or "/" in text:
+    if "/" in text:
         raise UnknownNameError(
             f"{short_repr(text)} is the name of a file, but names of URDF and MJCF files end in "
             f"{', '.join(_FILE_ENDINGS)}. fb.load also accepts {', '.join(CATALOGUE)}, and the "

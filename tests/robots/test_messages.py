@@ -34,7 +34,7 @@ def with_entry(value, at, entry):
         (lambda: fb.load("zzz"), "zzz", "a1"),
         (lambda: fb.load(3), 3),
         (lambda: fb.load("my/robot"), "my/robot", ".urdf", "go2", "solo12"),
-        (lambda: fb.load(Path("x.urdf.xacro")), "x.urdf.xacro", ".xml"),
+        (lambda: fb.load(Path("x/robot")), "x/robot", ".xml"),
         (lambda: fb.load("go2", feet=["FL_fot"]), "go2", "FL_fot", "FL_foot"),
         (lambda: GO2.standing().point("toe"), "go2", "toe"),
         (lambda: GO2.frame_id("FL_fot"), "FL_fot", "FL_foot"),
