@@ -1,7 +1,7 @@
 """floatbase: control of floating-base robots, as a course and as a library.
 
 Robots
-    `catalogue`, `load`, `load_urdf`, `Robot`, `State`
+    `catalogue`, `load`, `load_urdf`, `load_mjcf`, `Robot`, `State`
 Dynamics
     `Contacts`, `equations_of_motion` (7), `forces_from_torques` (9), `accelerations_from_torques`
     (14), `feasible_space` (13)
@@ -59,7 +59,7 @@ from floatbase.objectives import (
     standing_tasks,
 )
 from floatbase.qp import QP, solve
-from floatbase.robots import Robot, State, catalogue, load, load_urdf
+from floatbase.robots import Robot, State, catalogue, load, load_mjcf, load_urdf
 
 if TYPE_CHECKING:
     from floatbase.simulation import (
@@ -92,7 +92,7 @@ __all__ = [
     "InfeasibleError", "OrientationTask", "PostureTask", "Push", "Quadratic", "Robot", "Rollout",
     "Simulation", "State", "TorqueTask", "Viewer", "WholeBodyController",
     "accelerations_from_torques", "catalogue", "equations_of_motion", "feasible_space",
-    "forces_from_torques", "load", "load_urdf", "push_recovery", "rollout", "solve",
+    "forces_from_torques", "load", "load_mjcf", "load_urdf", "push_recovery", "rollout", "solve",
     "standing_tasks", "sweep",
 ]  # fmt: skip
 

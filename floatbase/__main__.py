@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import floatbase as fb
+from floatbase.robots import file_loader
 
 if TYPE_CHECKING:
     from floatbase.playground import Playground
@@ -40,14 +41,14 @@ def _parser() -> argparse.ArgumentParser:
     commands.add_parser("robots", help="list the available robots and their uses")
     view = commands.add_parser("view", help="show a live robot in the browser (Ctrl-C to stop)")
     view.add_argument(
-        "robot", help="name of a robot, as listed by `robots`, or path of a URDF file"
+        "robot", help="name of a robot, as listed by `robots`, or path of a URDF or MJCF file"
     )
     view.add_argument(
         "--feet",
         nargs="+",
         default=[],
         metavar="LINK",
-        help="links of the URDF that are in contact with the ground",
+        help="links of the file that are in contact with the ground",
     )
     view.add_argument(
         "--foot-radius",
@@ -57,7 +58,7 @@ def _parser() -> argparse.ArgumentParser:
         help="radius of ball feet at these links [m]",
     )
     view.add_argument(
-        "--fixed", action="store_true", help="fix the root link of the URDF to the ground"
+        "--fixed", action="store_true", help="fix the root link of the file to the ground"
     )
     view.add_argument(
         "--friction",
@@ -157,14 +158,11 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
-    if not options.robot.lower().endswith((".urdf", ".xml")):
+    load_file = file_loader(options.robot)
+    if load_file is None:
         return fb.load(options.robot)
-    return fb.load_urdf(
-        options.robot,
-        floating=not options.fixed,
-        feet=options.feet,
-        foot_radius=options.foot_radius,
-    )
+    fixed = {"floating": False} if options.fixed else {}
+    return load_file(options.robot, feet=options.feet, foot_radius=options.foot_radius, **fixed)
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:

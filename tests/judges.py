@@ -201,11 +201,14 @@ def turn_between(R_to: Array, R_from: Array) -> Array:
 
 
 class Mujoco:
-    """MuJoCo's M, h and Jacobians of a robot's state, in our coordinates: qvel = T v."""
+    """MuJoCo's M, h and Jacobians of a robot's state, in our coordinates: qvel = T v.
 
-    def __init__(self, robot: Robot):
+    The model is that of the simulation, unless another one is given.
+    """
+
+    def __init__(self, robot: Robot, model: mujoco.MjModel | None = None):
         self.robot = robot
-        self.model = fb.Simulation(robot).model
+        self.model = fb.Simulation(robot).model if model is None else model
         self.data = mujoco.MjData(self.model)
         self.convert = Conversion(robot, self.model)
 

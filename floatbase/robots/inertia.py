@@ -25,7 +25,7 @@ def add_point_mass(
     model.inertias[carrier.parentJoint] += _point_mass(mass, in_joint)
     root = ElementTree.fromstring(urdf)
     (element,) = (one for one in root.findall("link") if one.get("name") == link.name)
-    inertia = _read_inertia(element) + _point_mass(mass, link.placement.actInv(in_joint))
+    inertia = read_inertia(element) + _point_mass(mass, link.placement.actInv(in_joint))
     _write_inertia(element, inertia)
     return model, ElementTree.tostring(root, encoding="unicode")
 
@@ -39,7 +39,7 @@ def scale_masses(model: pin.Model, urdf: str, factor: float) -> tuple[pin.Model,
     root = ElementTree.fromstring(urdf)
     for link in root.findall("link"):
         if link.find("inertial") is not None:
-            _write_inertia(link, _scaled(_read_inertia(link), factor))
+            _write_inertia(link, _scaled(read_inertia(link), factor))
     return model, ElementTree.tostring(root, encoding="unicode")
 
 
@@ -58,26 +58,24 @@ def _scaled(inertia: pin.Inertia, factor: float) -> pin.Inertia:
     return scaled
 
 
-def _numbers(element: ElementTree.Element | None, name: str) -> Array:
+def read_numbers(element: ElementTree.Element | None, name: str) -> Array:
     """Return an attribute of three numbers, zeros by default."""
-    text = "" if element is None else element.get(name, "")
-    return np.array(text.split(), dtype=np.float64) if text else np.zeros(3)
+    text = "0 0 0" if element is None else element.get(name, "0 0 0")
+    return np.array(text.split(), dtype=np.float64)
 
 
-def _read_inertia(link: ElementTree.Element) -> pin.Inertia:
+def read_inertia(link: ElementTree.Element) -> pin.Inertia:
     """Return the inertia of a link in the link's frame; zero without <inertial>."""
     inertia = pin.Inertia.Zero()
-    inertial = link.find("inertial")
-    mass = None if inertial is None else inertial.find("mass")
-    if inertial is None or mass is None:
+    mass, tensor = link.find("inertial/mass"), link.find("inertial/inertia")
+    if mass is None or tensor is None:
         return inertia
-    origin, tensor = inertial.find("origin"), inertial.find("inertia")
+    origin = link.find("inertial/origin")
     inertia.mass = float(mass.get("value", 0.0))
-    inertia.lever = _numbers(origin, "xyz")
-    if tensor is not None:
-        xx, xy, xz, yy, yz, zz = (float(tensor.get(f"i{axes}", 0.0)) for axes in _UPPER)
-        R = pin.rpy.rpyToMatrix(_numbers(origin, "rpy"))
-        inertia.inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+    inertia.lever = read_numbers(origin, "xyz")
+    xx, xy, xz, yy, yz, zz = (float(tensor.get(f"i{axes}", 0.0)) for axes in _UPPER)
+    R = pin.rpy.rpyToMatrix(read_numbers(origin, "rpy"))
+    inertia.inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
     return inertia
 
 

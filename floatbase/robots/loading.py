@@ -1,4 +1,4 @@
-"""Loading robots: the catalogue, other robots of example-robot-data, and your own URDFs.
+"""Loading robots: the catalogue, other robots of example-robot-data, your own URDFs and MJCFs.
 
 Robots of example-robot-data that are not in the catalogue need their feet to be given.
 """
@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +19,9 @@ import pinocchio as pin
 from floatbase._validation import (
     Array,
     as_bool,
-    as_instance,
     as_positive,
     as_string,
     as_strings,
-    read_only,
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
@@ -32,22 +30,21 @@ from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 from floatbase.robots.urdf import (
-    check_urdf,
+    check_couplings,
+    check_model,
+    normalize_urdf,
     parse_urdf,
-    read_urdf,
+    read_text,
     with_locked_joints,
-    without_world_link,
 )
 
-# width and thickness, m, of the plate on which `with_floating_base` places a robot
-PLATE_SIZE = (0.4, 0.03)
+_FILE_ENDINGS = (".urdf", ".xml", ".mjcf")
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
 
 def catalogue() -> dict[str, str]:
@@ -62,7 +59,7 @@ def catalogue() -> dict[str, str]:
 
 
 def load(
-    name: str,
+    name: str | Path,
     *,
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
@@ -74,8 +71,9 @@ def load(
 
     Parameters
     ----------
-    name : str
-        One of `catalogue()`, or any other robot of example-robot-data that has a URDF.
+    name : str or Path
+        One of `catalogue()`, any other robot of example-robot-data that has a URDF, or the path of
+        a file, which `load_urdf` or `load_mjcf` loads.
     feet : sequence of str or Foot, optional
         Frames or `Foot` values that can touch the ground; by default those of the catalogue.
         Floating-base robots outside the catalogue require them.
@@ -115,11 +113,22 @@ def load(
     """
     import example_robot_data as data
 
+    name = str(name) if isinstance(name, Path) else name
+    load_file = file_loader(name)
+    if load_file is not None:
+        return load_file(
+            name,
+            feet=feet or (),
+            foot_radius=foot_radius,
+            torque_limits=torque_limits,
+            posture=posture,
+            locked=locked,
+        )
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
     path = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
     root = Path(data.getModelPath(path)).resolve()
-    urdf = read_urdf(root / path)
+    urdf = normalize_urdf(name, read_text(root / path), loader.free_flyer)
     model = parse_urdf(name, urdf, loader.free_flyer)
     srdf = (
         root / loader.path / loader.srdf_subpath / loader.srdf_filename
@@ -159,6 +168,29 @@ def load(
     return robot
 
 
+def file_loader(path: str) -> Callable[..., Robot] | None:
+    """Choose the function that loads a robot's file, according to its outermost element.
+
+    Parameters
+    ----------
+    path : str
+        Path of a file, or the name of a robot.
+
+    Returns
+    -------
+    callable or None
+        `load_urdf` or `load_mjcf`; None unless the path ends like a URDF or MJCF file.
+    """
+    endings = *_FILE_ENDINGS, ".xacro", ".sdf"  # of these, load_urdf says what to run first
+    if not isinstance(path, str) or not path.lower().endswith(endings):
+        return None
+    try:
+        tag = ElementTree.fromstring(read_text(Path(os.path.expanduser(path)))).tag
+    except ElementTree.ParseError:
+        tag = ""  # load_urdf describes the error
+    return load_mjcf if tag == "mujoco" else load_urdf
+
+
 def load_urdf(
     path: str | Path,
     *,
@@ -181,7 +213,8 @@ def load_urdf(
         Name of the robot. By default the file name without its extension, or "robot" if the text is
         given.
     floating : bool, optional
-        Whether the root link can move freely.
+        Whether the base can move freely. The base is then the first link with mass: links without
+        mass below it, such as "world", are removed, together with a floating joint.
     package_dirs : sequence of str or Path, optional
         Folders that contain meshes named package://…; the folder of the file is always searched.
     feet : sequence of str or Foot, optional
@@ -212,8 +245,14 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture, or if no posture is
-        given and a leg of a floating-base robot is straight or otherwise singular.
+        If the motors of a fixed-base robot are too weak to hold its posture, if no posture is
+        given and a leg of a floating-base robot is straight or otherwise singular, if only some
+        joints have a torque limit, or if the URDF has settings for MuJoCo, which are ignored.
+
+    Notes
+    -----
+    `Robot.urdf` is not the text of the file. It holds the links, joints and materials alone, in a
+    form that Pinocchio and MuJoCo read in the same way.
     """
     urdf = as_string("path", str(path) if isinstance(path, Path) else path)
     directories = _as_directories(package_dirs)
@@ -232,7 +271,8 @@ def load_urdf(
                     f"There is no file {urdf}, but there is a robot with this name. Load it with "
                     f'fb.load("{urdf}").'
                 )
-        urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
+        urdf, directories = read_text(file), (*directories, file.resolve().parent)
+    urdf = normalize_urdf(name, urdf, floating)
     model = parse_urdf(name, urdf, floating)
     start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
     robot = _make_robot(
@@ -248,6 +288,95 @@ def load_urdf(
     _warn_if_motors_are_weak(robot)
     if posture is None:
         _warn_if_legs_are_singular(robot)
+    if torque_limits is None:
+        _warn_if_joints_are_passive(robot)
+    return robot
+
+
+def load_mjcf(
+    path: str | Path,
+    *,
+    name: str | None = None,
+    floating: bool | None = None,
+    feet: Sequence[str | Foot] = (),
+    foot_radius: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | str | None = None,
+    locked: Sequence[str] = (),
+) -> Robot:
+    """Load your own robot from an MJCF, the file format of MuJoCo.
+
+    MuJoCo compiles the file. `Robot.urdf` is then a URDF of the robot in it: of the free body with
+    the most joints, or of everything that is attached to the world. Bodies, sites and named
+    geoms that can touch others are links. Rotor inertias (armature) become part of M.
+
+    Parameters
+    ----------
+    path : str or Path
+        Path of the MJCF file.
+    name : str, optional
+        Name of the robot. By default the file name without its extension.
+    floating : bool, optional
+        Whether the base can move freely; by default, whether it has a free joint in the file. With
+        True, a free joint replaces the joints between the base and the world.
+    feet : sequence of str or Foot, optional
+        Bodies, sites, geoms or `Foot` values that can touch the ground; none by default.
+    foot_radius : float, optional
+        Radius of the feet that are given as names [m]; 0 by default.
+    torque_limits : float or array_like, shape (d,), optional
+        Torque limits [N·m]; by default what the actuators and joints of the file allow.
+    posture : str or array_like, shape (nq,) or (nq - 7,), optional
+        Standing configuration of the robot before joints are locked: the name of a keyframe, or
+        numbers as in `load_urdf`. By default the first keyframe, or the file's initial
+        configuration, with joints brought within their limits.
+    locked : sequence of str, optional
+        Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
+
+    Returns
+    -------
+    Robot
+        The robot.
+
+    Raises
+    ------
+    UnknownNameError
+        If a keyframe, a foot or a locked joint does not exist.
+    InputError
+        If MuJoCo cannot read the file, if the robot has ball joints, if the base cannot float, or
+        for the same reasons as in `load_urdf`.
+
+    Warns
+    -----
+    RobotWarning
+        If the file contains parts that the robot does not have, such as tendons, springs,
+        constraints and other free bodies, or for the same reasons as in `load_urdf`.
+    """
+    from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
+
+    file = Path(
+        os.path.expanduser(as_string("path", str(path) if isinstance(path, Path) else path))
+    )
+    if floating is not None:
+        as_bool("floating", floating)
+    name = file.stem if name is None else as_string("name", name)
+    keyframe = posture if isinstance(posture, str) else None
+    mjcf = read_mjcf(name, file, floating, keyframe)
+    robot = _make_robot(
+        name,
+        mjcf.urdf,
+        mjcf.model,
+        mjcf.posture if posture is None or isinstance(posture, str) else posture,
+        locked,
+        torque_limits,
+        package_dirs=(mjcf.folder,),
+        feet=_as_feet(feet, foot_radius),
+    )
+    if mjcf.differences:
+        message = f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."
+        warnings.warn(message, RobotWarning, stacklevel=2)
+    _warn_if_motors_are_weak(robot)
+    if posture is None:
+        _warn_if_legs_are_singular(robot)
     return robot
 
 
@@ -259,58 +388,6 @@ def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
         else paths
     )
     return tuple(map(Path, as_strings("package_dirs", strings)))
-
-
-def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
-    """Free the base of a fixed-base robot.
-
-    The links and joints of the URDF stay the same. The link "world", which some URDFs have below
-    the base, and the joints attached to it are removed.
-
-    Parameters
-    ----------
-    robot : Robot
-        Robot with a fixed base, such as ur5.
-    plate : bool, optional
-        Whether the robot stands on a massless square plate of size `PLATE_SIZE`. Otherwise it
-        touches nothing and floats 1 m above the ground.
-
-    Returns
-    -------
-    Robot
-        The robot with a floating base.
-
-    Raises
-    ------
-    InputError
-        If the base is already floating.
-    """
-    as_bool("plate", plate)
-    if as_instance("robot", robot, Robot, 'fb.load("ur5")').is_floating:
-        raise InputError(
-            f"The base of {robot.name} is already floating. with_floating_base needs a robot with "
-            f"a fixed base, such as ur5."
-        )
-    floating = load_urdf(
-        without_world_link(robot.urdf),
-        name=robot.name,
-        package_dirs=robot.package_dirs,
-        torque_limits=robot.torque_limits,
-    )
-    width, thickness = PLATE_SIZE
-    corners = np.array(
-        [
-            [x * width, y * width, -thickness]
-            for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
-        ]
-    )
-    return replace(
-        floating,
-        feet=(Foot(floating.base, corners=corners),) if plate else (),
-        posture=read_only(
-            [0.0, 0.0, thickness if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]
-        ),
-    )
 
 
 def _make_robot(
@@ -341,7 +418,8 @@ def _make_robot(
         model.armature = np.array(
             [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
         )
-    check_urdf(name, urdf, model)
+    check_couplings(name, urdf)
+    check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
@@ -375,6 +453,21 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
+def _warn_if_joints_are_passive(robot: Robot) -> None:
+    """Warn if only some joints have a torque limit in the URDF: the others may have no motor.
+
+    The warning points at the code that called the loading function.
+    """
+    unlimited = np.array(robot.joint_names)[np.isinf(robot.torque_limits)].tolist()
+    if 0 < len(unlimited) < robot.d:
+        message = (
+            f"The URDF of {robot.name} gives no effort, or effort=0, for {', '.join(unlimited)}. "
+            f"Their motors have no torque limits. If these joints are passive, for example in a "
+            f"closed loop, lock them with locked=[…]. Otherwise, pass torque_limits."
+        )
+        warnings.warn(message, RobotWarning, stacklevel=3)
+
+
 def _warn_if_legs_are_singular(robot: Robot) -> None:
     """Warn if a foot of a floating-base robot moves in fewer directions than with a bent leg.
 
@@ -400,19 +493,18 @@ def _warn_if_legs_are_singular(robot: Robot) -> None:
             f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
             f"The legs of {', '.join(singular)} are then singular, for example straight, and "
             f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
-            f"load_urdf: {robot.d} joint positions."
+            f"load_urdf: {robot.nq - 7} joint positions."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     """Return the entry of a robot in example-robot-data."""
-    text = str(name) if isinstance(name, str | Path) else ""
-    if text.endswith((".urdf", ".xml", ".xacro")) or "/" in text:
-        path = short_repr(text)
+    text = name if isinstance(name, str) else ""
+    if "/" in text:
         raise UnknownNameError(
-            f"{path} is the name of a file, not of a robot. Load your own URDF with "
-            f"fb.load_urdf({path}, feet=[…]). fb.load accepts {', '.join(CATALOGUE)}, and the "
+            f"{short_repr(text)} is the name of a file, but names of URDF and MJCF files end in "
+            f"{', '.join(_FILE_ENDINGS)}. fb.load also accepts {', '.join(CATALOGUE)}, and the "
             f"other names of example-robot-data."
         )
     if not isinstance(name, str) or name not in known:

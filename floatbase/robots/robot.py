@@ -94,7 +94,7 @@ class Foot(Value):
 class Robot(Value):
     """A robot model with feet, torque limits and a standing posture.
 
-    Use `load` or `load_urdf` to make one. A robot is immutable.
+    Use `load`, `load_urdf` or `load_mjcf` to make one. A robot is immutable.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Robot(Value):
         Pinocchio model with q = (base position [m, world frame], base quaternion x y z w, joints),
         or q = joints if the base is fixed.
     urdf : str
-        Text of the URDF, from which the simulation and the viewer are built.
+        Checked text of the URDF, from which the simulation and the viewer are built.
     package_dirs : tuple of Path
         Folders that contain meshes named package://….
     feet : tuple of Foot
@@ -319,10 +319,13 @@ class Robot(Value):
     def _frame_ids(self) -> dict[str, int]:
         """Index of each frame in Pinocchio.
 
-        Frames with the same name get the index of the first. "base" is the base link.
+        A link and a joint may share a name, which then stands for the link. Of other frames with
+        the same name, the first counts. "base" is the base link.
         """
-        numbers = {str(frame.name): i for i, frame in reversed(list(enumerate(self.model.frames)))}
-        return {"base": numbers[self.base], **numbers}
+        frames = list(enumerate(self.model.frames))[::-1]  # of equal names, the last entry counts
+        links = {str(frame.name): i for i, frame in frames if frame.type == pin.FrameType.BODY}
+        numbers = {str(frame.name): i for i, frame in frames} | links
+        return {"base": numbers[self.base]} | numbers
 
     def frame_id(self, frame: str) -> int:
         """Return the index of a frame in Pinocchio.

@@ -1,143 +1,349 @@
-"""URDF text: reading, checking, locking joints and removing the world link."""
+"""URDF text: reading, checking, writing it in one form for all programs, and locking joints."""
 
 from __future__ import annotations
 
 import math
+import re
+import warnings
 import xml.etree.ElementTree as ElementTree
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection
 from pathlib import Path
 
 import pinocchio as pin
 
 from floatbase._files import read_file
-from floatbase._validation import Array
-from floatbase.errors import InputError
+from floatbase._validation import Array, short_repr
+from floatbase.errors import InputError, RobotWarning
 from floatbase.robots._checks import has_floating_base
+from floatbase.robots.inertia import read_inertia, read_numbers
 
-_INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+Element = ElementTree.Element
+
 _LIMITED_JOINT_TYPES = ("revolute", "prismatic")  # joint types that need a <limit>
+_JOINT_TYPES = (*_LIMITED_JOINT_TYPES, "continuous", "fixed", "floating", "planar")
+# the elements that are kept, each with those that are kept inside it
+_CHILDREN = {
+    "robot": ("link", "joint", "material"),
+    "link": ("inertial", "visual", "collision", "collision_checking"),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry", "material"),
+    "collision": ("origin", "geometry"),
+    "geometry": ("box", "cylinder", "sphere", "capsule", "mesh"),
+    "collision_checking": ("capsule", "convex"),  # Pinocchio's, with names of collision shapes
+    "material": ("color", "texture"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic"),
+}
+_REPEATABLE = ("link", "joint", "material", "visual", "collision", "capsule", "convex")
+# how many numbers each attribute holds
+_NUMBERS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1),
+    "axis": {"xyz": 3},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+    "dynamics": {"damping": 1, "friction": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "mesh": {"scale": 3},
+    "color": {"rgba": 4},
+}
+_REQUIRED = {"joint": ("parent", "child"), "inertial": ("mass", "inertia")}
+# attributes with a default; all other attributes of an element are required
+_OPTIONAL = ("xyz", "rpy", "lower", "upper", "damping", "friction", "multiplier", "offset", "scale")
+# what all readers take for the same number; Python's float() accepts more, such as 1_000
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+_INFINITY = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
+_XACRO = "Run xacro first, as in `xacro robot.urdf.xacro > robot.urdf` (`pip install xacro`)."
+_OTHER_FORMATS = {
+    "mujoco": "This is an MJCF file. Load it with fb.load_mjcf.",
+    "sdf": "This is an SDF file. Load the URDF from which it was made, or convert it, for example "
+    "with `sdf2urdf` of the ROS package pysdf.",
+}
 # kg m²: some programs write -5e-20 for an inertia of 0, and every real part of a robot has more
 _ROUNDING = 1e-12
 
 
-def read_urdf(path: Path) -> str:
-    """Read the text of a URDF file."""
+def read_text(path: Path) -> str:
+    """Read the text of a URDF or MJCF file."""
     try:
         # a comment in another encoding does not change the robot
         return read_file(path).decode("utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF file."
+            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF or "
+            f"MJCF file."
         ) from None
+
+
+def normalize_urdf(name: str, text: str, floating: bool) -> str:
+    """Return a URDF that Pinocchio, MuJoCo and Python's XML read in the same way.
+
+    Only links, joints and materials remain. All their numbers are checked. A floating base is the
+    first link with mass. A warning about ignored content points at the caller's caller.
+    """
+    root = _parse_xml(name, text)
+    ignored = [
+        f"<{part.tag}> {key}={value!r}"
+        for part in root.findall("mujoco//*")
+        for key, value in part.items()
+    ]
+    if ignored:
+        message = (
+            f"MuJoCo's settings in the URDF of {name} are ignored: {', '.join(ignored)}. They "
+            f"would change the simulation, but not the controller."
+        )
+        warnings.warn(message, RobotWarning, stacklevel=3)
+    _normalize_element(root, name)
+    base = _check_tree(name, root)
+    for joint in root.findall("joint"):
+        _normalize_joint(name, joint)
+    if floating:
+        _remove_links_below_base(root, base)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _parse_xml(name: str, text: str) -> Element:
+    """Return the outermost element of a URDF; other formats are an `InputError`."""
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        hint = f" The file is written in xacro. {_XACRO}" if "xacro:" in text else ""
+        raise InputError(f"{name} is not a valid URDF: {error}.{hint}") from None
+    if any("xacro" in element.tag for element in root.iter()):
+        raise InputError(f"{name} is not a URDF: the file is written in xacro. {_XACRO}")
+    namespace = root.tag[: root.tag.find("}") + 1]  # readers other than Python's ignore it
+    for element in root.iter():
+        element.tag = element.tag.removeprefix(namespace)
+    if root.tag != "robot":
+        hint = _OTHER_FORMATS.get(root.tag, "Give the path of a URDF file.")
+        raise InputError(
+            f"{name} is not a URDF: its outermost element is <{root.tag}>, but it must be <robot>. "
+            f"{hint}"
+        )
+    return root
+
+
+def _normalize_element(element: Element, where: str) -> None:
+    """Remove what not all readers know, and check all numbers."""
+    if element.tag in _NUMBERS:
+        _normalize_numbers(element, where)
+    if element.tag in ("link", "joint"):
+        where = f"{element.tag} {element.get('name')!r} of {where}"
+    elif element.tag != "robot":
+        where = f"<{element.tag}> of {where}"
+    seen = set[str]()
+    for child in list(element):
+        repeated = child.tag in seen and child.tag not in _REPEATABLE
+        if repeated and element.tag in ("link", "joint", "inertial"):
+            raise InputError(f"More than one <{child.tag}> in {where}. Keep one of them.")
+        is_known = child.tag in _CHILDREN.get(element.tag, ())
+        if repeated or not is_known or (child.tag == "mesh" and not child.get("filename")):
+            element.remove(child)
+            continue
+        seen.add(child.tag)
+        if element.tag == "geometry" and child.tag == "capsule":
+            child.tag = "cylinder"  # Pinocchio's reader knows no capsule
+        _normalize_element(child, where)
+        if child.tag in ("visual", "collision") and child.find("geometry/*") is None:
+            element.remove(child)
+    missing = [tag for tag in _REQUIRED.get(element.tag, ()) if tag not in seen]
+    if missing:
+        raise InputError(f"There is no <{missing[0]}> in {where}. Add it.")
+
+
+def _normalize_numbers(element: Element, where: str) -> None:
+    """Write numbers without blanks around them, and remove attributes that few readers know."""
+    if "quat_xyzw" in element.attrib:
+        raise InputError(f"<{element.tag}> of {where} has quat_xyzw. Write the rotation as rpy.")
+    for key in list(element.attrib):
+        if key not in (*_NUMBERS[element.tag], "filename", "joint"):
+            del element.attrib[key]
+    for key, count in _NUMBERS[element.tag].items():
+        text = element.get(key)
+        if text is None and key in _OPTIONAL:
+            continue
+        words = (text or "").split()
+        if len(words) != count or not all(_is_number(word, element.tag) for word in words):
+            found = f"no {key}" if text is None else f"{key}={text!r}"
+            needed = f"{count} numbers with blanks between them" if count > 1 else "a number"
+            needed += " ≥ 0" if element.tag == "mass" else ""
+            hint = " Write decimals with a point." if "," in (text or "") else ""
+            hint = f" The file is written in xacro. {_XACRO}" if "$" in (text or "") else hint
+            raise InputError(f"<{element.tag}> of {where} has {found}, but needs {needed}.{hint}")
+        element.set(key, " ".join(words))
+
+
+def _is_number(word: str, tag: str) -> bool:
+    """Return whether all readers take a word for the same valid number."""
+    if tag == "limit" and _INFINITY.fullmatch(word):
+        return True
+    is_finite = _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
+    return is_finite and (tag != "mass" or float(word) >= 0.0)
+
+
+def _check_tree(name: str, root: Element) -> str:
+    """Return the name of the base, after checking names and types and that links form a tree."""
+    for kind in ("link", "joint"):
+        names = Counter(element.get("name", "") for element in root.findall(kind))
+        for label, count in names.items():
+            if count > 1 or not label:
+                raise InputError(
+                    f"{kind}s of {name} with the name {label!r}: {count}. Give each its own name."
+                )
+    links = [link.get("name", "") for link in root.findall("link")]
+    joints_of = defaultdict[str, list[str]](list)  # joints that move or hold a link
+    children = defaultdict[str, list[str]](list)
+    for joint in root.findall("joint"):
+        label, (parent, child) = joint.get("name", ""), _ends(joint)
+        missing = [link for link in (parent, child) if link not in links]
+        if missing or joint.get("type") not in _JOINT_TYPES:
+            raise InputError(
+                f"Joint {label!r} of {name} connects link {missing[0]!r}, which does not exist."
+                if missing
+                else f"Joint {label!r} of {name} has the type {joint.get('type')!r}. It must be "
+                f"one of {', '.join(_JOINT_TYPES[:4])}."
+            )
+        joints_of[child].append(label)
+        children[parent].append(child)
+    for link, labels in joints_of.items():
+        if len(labels) > 1:
+            raise InputError(
+                f"Link {link!r} of {name} has {len(labels)} parents, through the joints "
+                f"{', '.join(labels)}. A URDF cannot describe closed loops. Keep one of the joints."
+            )
+    roots = [link for link in links if link not in joints_of]
+    if len(roots) > 1:
+        raise InputError(
+            f"{len(roots)} links of {name} have no parent: {', '.join(roots)}. Only the base has "
+            f"none. Connect the others with joints, or remove them."
+        )
+    reached = roots[:]
+    for link in reached:  # it grows
+        reached.extend(children[link])
+    if not links:
+        raise InputError(f"{name} has no <link>. Give the path of a URDF file with links.")
+    if loop := [link for link in links if link not in reached]:
+        raise InputError(
+            f"The joints of {name} form a loop through {short_repr(loop)}. Every link except the "
+            f"base needs one parent, and the base none. Remove a joint of the loop."
+        )
+    return roots[0]
+
+
+def _ends(joint: Element) -> list[str]:
+    """Return the names of the links that a joint connects, parent first."""
+    return [joint.find(end).get("link", "") for end in ("parent", "child")]  # type: ignore[union-attr]  # it was checked
+
+
+def _normalize_joint(name: str, joint: Element) -> None:
+    """Check the axis and limits of a joint, and write out what readers complete differently."""
+    label, kind, limit = joint.get("name"), joint.get("type"), joint.find("limit")
+    if kind == "fixed":
+        for tag in ("axis", "limit", "dynamics", "mimic"):
+            for element in joint.findall(tag):
+                joint.remove(element)
+        return
+    axis = joint.find("axis")
+    if axis is None:
+        axis = ElementTree.SubElement(joint, "axis")
+    axis.attrib.setdefault("xyz", "1 0 0")
+    if not any(read_numbers(axis, "xyz")):
+        raise InputError(
+            f'The <axis> of joint {label!r} of {name} is zero. Give a direction, as in xyz="0 0 1".'
+        )
+    if limit is None:
+        if kind in _LIMITED_JOINT_TYPES:
+            raise InputError(
+                f"{kind} joint {label!r} of {name} has no <limit>. Add one with lower, upper, "
+                f"effort and velocity."
+            )
+        return
+    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    is_limited = kind in _LIMITED_JOINT_TYPES and lower != upper and not math.isinf(upper - lower)
+    if kind in _LIMITED_JOINT_TYPES and (lower > upper or math.isinf(lower) != math.isinf(upper)):
+        raise InputError(
+            f"Joint {label!r} of {name} has the limits lower={lower:g} and upper={upper:g} (rad or "
+            f"m; a missing limit is 0). The lower limit must not be above the upper limit. Give "
+            f"two finite limits, or make the joint continuous if it has no limits."
+        )
+    for key, value in (("lower", lower), ("upper", upper)):
+        limit.attrib.pop(key, None)
+        if is_limited:
+            limit.set(key, repr(value))
+    for key in ("effort", "velocity"):
+        if math.isinf(float(limit.get(key, "0"))):
+            limit.set(key, "0")  # unknown
+
+
+def _remove_links_below_base(root: Element, base: str) -> None:
+    """Make the first link with mass the base, if links without mass lie below it.
+
+    Files for a robot on a stand, and files in which a joint frees the base, have such links.
+    """
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    joints_of = defaultdict[str, list[Element]](list)
+    for joint in root.findall("joint"):
+        joints_of[_ends(joint)[0]].append(joint)
+    below, origins, is_free, is_stand = list[Element](), list[Element](), False, False
+    while len(joints_of[base]) == 1 and read_inertia(links[base]).mass == 0.0:
+        link, (joint,) = links[base], joints_of[base]
+        is_free |= joint.get("type") == "floating"
+        is_stand |= base.lower() == "world"
+        is_bare = joint.get("type") == "fixed" and {part.tag for part in link} <= {"inertial"}
+        if joint.get("type") not in ("fixed", "floating") or not (is_free or is_stand or is_bare):
+            break
+        below += [link, joint]
+        origins += joint.findall("origin")
+        base = _ends(joint)[1]
+    is_tilted = any(any(read_numbers(origin, "rpy")[:2]) for origin in origins)
+    if is_tilted and not is_free:  # the lowest link shows which way is up: move it to the base
+        for origin in origins:
+            origin.attrib.pop("xyz", None)
+    elif is_free or is_stand or any(any(read_numbers(origin, "xyz")) for origin in origins):
+        for element in below:
+            root.remove(element)
 
 
 def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
     """Build the Pinocchio model of a URDF text, with a root joint if the base is floating."""
     try:
-        ElementTree.fromstring(urdf)
         return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
-    except (ElementTree.ParseError, RuntimeError, ValueError) as error:
-        raise InputError(f"{name} is not a valid URDF: {_parse_error(urdf, error)}") from None
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"{name} is not a valid URDF: {error}") from None
 
 
-def _parse_error(urdf: str, error: Exception) -> str:
-    """Return why text is not a URDF; Pinocchio prints the reason instead of raising it."""
-    if "xacro:" in urdf:
-        return (
-            f"{str(error).rstrip('.')}. The file is written in xacro. Run xacro first, as in "
-            f"`xacro robot.xacro > robot.urdf`."
-        )
-    if isinstance(error, ElementTree.ParseError):
-        return str(error)
-    root = ElementTree.fromstring(urdf)
-    if root.tag != "robot":
-        return f"its outermost element is <{root.tag}>, but it must be <robot>."
-    for kind in ("link", "joint"):
-        for duplicate, count in Counter(
-            element.get("name") for element in root.findall(kind)
-        ).items():
-            if count > 1:
-                return f"{count} {kind}s have the name {duplicate!r}. Names must be unique."
-    for joint in root.findall("joint"):
-        if joint.get("type") in _LIMITED_JOINT_TYPES and joint.find("limit") is None:
-            return (
-                f"{joint.get('type')} joint {joint.get('name')!r} has no <limit>. Add one with "
-                f"lower, upper, effort and velocity."
-            )
-    return str(error)
-
-
-def check_urdf(name: str, urdf: str, model: pin.Model) -> None:
-    """Raise `InputError` for content that Pinocchio accepts but eqs. (1)-(7) cannot represent."""
-    root = ElementTree.fromstring(urdf)
-    for check in _CHECKS:
-        check(name, root, model)
-
-
-def _check_inertials(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Check that masses and inertias are numbers, and that no mass is negative."""
-    for link in root.findall("link"):
-        for inertial in link.findall("inertial"):
-            mass, tensor = inertial.find("mass"), inertial.find("inertia")
-            values = {"mass": mass.get("value") if mass is not None else None}
-            values |= {
-                entry: tensor.get(entry) if tensor is not None else None
-                for entry in _INERTIA_ATTRIBUTES
-            }
-            invalid = [
-                f"{key} {text}"
-                for key, text in values.items()
-                if not math.isfinite(_as_float(text))
-            ]
-            invalid += [f"mass {values['mass']}"] if _as_float(values["mass"]) < 0.0 else []
-            if invalid:
-                raise InputError(
-                    f"<inertial> of link {link.get('name')!r} of {name} has {invalid[0]}. It needs "
-                    f"a mass ≥ 0 [kg] and six numbers ixx … izz [kg m²]."
-                )
-
-
-def _check_limits_and_axes(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Check that no lower limit is above its upper limit, and that axes are not zero."""
-    for joint in _movable_joints(root):
-        label, limit, axis = joint.get("name"), joint.find("limit"), joint.find("axis")
-        lower, upper = (
-            _as_float(limit.get(end, "0")) if limit is not None else 0.0
-            for end in ("lower", "upper")
-        )
-        if joint.get("type") in _LIMITED_JOINT_TYPES and lower > upper:
+def check_model(name: str, model: pin.Model) -> None:
+    """Raise `InputError` for a model that eqs. (1)-(7) cannot represent."""
+    _check_moments_of_inertia(name, model)
+    _check_reserved_names(name, model)
+    for joint in list(model.joints)[2 if has_floating_base(model) else 1 :]:
+        if joint.nv > 1:
             raise InputError(
-                f"The lower limit {lower:g} of joint {label!r} of {name} is above the upper limit "
-                f"{upper:g} (rad or m; a missing limit is 0). Swap lower and upper in <limit>, or "
-                f"make the joint continuous if it has no limits."
-            )
-        if axis is not None and not any(map(_as_float, axis.get("xyz", "1").split())):
-            raise InputError(
-                f"The <axis> of joint {label!r} of {name} is zero. Give a direction, as in "
-                f'xyz="0 0 1".'
+                f"Joint {model.names[joint.id]!r} of {name} has {joint.nv} degrees of freedom, but "
+                f"a motor drives only one. Make it revolute, continuous, prismatic or fixed. Only "
+                f"the base may move freely, with floating=True."
             )
 
 
-def _check_moments_of_inertia(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+def _check_moments_of_inertia(name: str, model: pin.Model) -> None:
     """Check that no link, including everything welded to it, has a negative moment of inertia."""
     # Pinocchio's inertias are sums, which may be positive although a part is negative
     for i, inertia in list(enumerate(model.inertias))[1:]:
         smallest = float(inertia.inertia.diagonal().min())
         if smallest < -_ROUNDING:
-            where = (
-                "The base"
-                if model.names[i] == "root_joint"
-                else f"The link moved by joint {model.names[i]!r}"
-            )
+            label = model.names[i]
+            where = "base" if label == "root_joint" else f"link moved by joint {label!r}"
             raise InputError(
-                f"{where} of {name}, with everything welded to it, has a negative moment of "
+                f"The {where} of {name}, with everything welded to it, has a negative moment of "
                 f"inertia, {smallest:.4g} kg m². Make ixx, iyy and izz of <inertia> positive."
             )
 
 
-def _check_reserved_names(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+def _check_reserved_names(name: str, model: pin.Model) -> None:
     """Check that the names "base" and "root_joint" are used for the base only."""
     base_frame = next((frame for frame in model.frames if frame.name == "base"), None)
     if base_frame is not None and base_frame.parentJoint != int(has_floating_base(model)):
@@ -152,52 +358,23 @@ def _check_reserved_names(name: str, root: ElementTree.Element, model: pin.Model
         )
 
 
-def _check_joint_types(name: str, root: ElementTree.Element, model: pin.Model) -> None:
-    """Check that every joint has one degree of freedom."""
-    names = [joint.get("name", "") for joint in _movable_joints(root)]
-    for joint in model.joints:
-        if joint.nv > 1 and model.names[joint.id] in names:
-            raise InputError(
-                f"Joint {model.names[joint.id]!r} of {name} has {joint.nv} degrees of freedom, but "
-                f"a motor drives only one. Make it revolute, continuous, prismatic or fixed. To "
-                f"free the base, use floating=True."
-            )
-
-
-def _check_couplings(name: str, root: ElementTree.Element, model: pin.Model) -> None:
+def check_couplings(name: str, urdf: str) -> None:
     """Check that no joint mimics another joint."""
-    names = [joint.get("name", "") for joint in _movable_joints(root)]
+    joints = ElementTree.fromstring(urdf).findall("joint")
+    names = [joint.get("name", "") for joint in joints if joint.get("type") != "fixed"]
     masters = {
         joint.get("name", ""): mimic.get("joint", "")
-        for joint in _movable_joints(root)
+        for joint in joints
         for mimic in joint.findall("mimic")
     }
     if masters:
-        pairs = ", ".join(
-            [f"{joint} mimics {master}" for joint, master in masters.items()][:2]
-            + ["…"] * (len(masters) > 2)
-        )
+        joint, master = next(iter(masters.items()))
         coupled = [joint for joint in names if joint in masters or joint in masters.values()]
         raise InputError(
-            f"Joints of {name} are coupled: {pairs}. Eqs. (1)-(7) need a separate motor for every "
-            f"joint. Lock these joints with locked={coupled}, or remove <mimic> from the URDF if "
-            f"they do have separate motors."
+            f"Joints of {name} are coupled by <mimic>, such as {joint} to {master}. Eqs. (1)-(7) "
+            f"need a separate motor for every joint. Lock these joints with locked={coupled}, or "
+            f"remove <mimic> from the URDF if they do have separate motors."
         )
-
-
-_CHECKS = (
-    _check_inertials,
-    _check_limits_and_axes,
-    _check_moments_of_inertia,
-    _check_reserved_names,
-    _check_joint_types,
-    _check_couplings,
-)
-
-
-def _movable_joints(root: ElementTree.Element) -> list[ElementTree.Element]:
-    """Return the joints of a URDF that are not fixed."""
-    return [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
 
 
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:
@@ -206,8 +383,7 @@ def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection
     pin.framesForwardKinematics(model, data, q)
     for joint in root.findall("joint"):
         if joint.get("name") in joints:
-            links = [joint.find(end).get("link") for end in ("parent", "child")]  # type: ignore[union-attr]  # Pinocchio read it
-            parent, child = (data.oMf[model.getFrameId(link, pin.BODY)] for link in links)
+            parent, child = (data.oMf[model.getFrameId(link, pin.BODY)] for link in _ends(joint))
             placement = parent.actInv(child)
             for element in (*joint.findall("origin"), *joint.findall("mimic")):
                 joint.remove(element)
@@ -219,25 +395,3 @@ def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection
             )
             joint.set("type", "fixed")
     return ElementTree.tostring(root, encoding="unicode")
-
-
-def without_world_link(urdf: str) -> str:
-    """Return a URDF without the link "world" and the joints attached to it.
-
-    Some URDFs have such a link below the base.
-    """
-    root = ElementTree.fromstring(urdf)
-    for element in [
-        *root.findall("link[@name='world']"),
-        *root.findall("joint/parent[@link='world']/.."),
-    ]:
-        root.remove(element)
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def _as_float(text: str | None) -> float:
-    """Return a number of a URDF, or NaN if the text is not a number."""
-    try:
-        return float(text or "nan")
-    except ValueError:
-        return math.nan

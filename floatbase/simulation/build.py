@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import SimulationError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation._conversion import rotation_matrix
+from floatbase.simulation.agreement import check_agreement
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.hulls import link_hulls
 
@@ -51,26 +52,21 @@ _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero
 # rounding
 _RELATIVE_ROUNDING = 1e-9
 
+_JOINT_ATTRIBUTES = ("name", "type", "range", "limited", "actfrcrange", "actfrclimited")
 
-def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel:
+
+def build_model(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjModel:
     """Build the MuJoCo model of a robot on the ground.
 
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
     """
-    model = copy.copy(_compiled_model(robot, _ground_data(ground), timestep))
-    if model.nv != robot.nv:
-        raise SimulationError(
-            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
-            f"robot has {robot.nv}. Its model was changed after it was read from the URDF; load "
-            f"the robot again."
-        )
-    return model
+    return copy.copy(_compiled_model(robot, _ground_data(ground), timestep, losses))
 
 
-def build_spec(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjSpec:
+def build_spec(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjSpec:
     """Write the description from which `build_model` builds the model, from the same arguments."""
-    return _build_spec(robot, _ground_data(ground), timestep)
+    return _build_spec(robot, _ground_data(ground), timestep, losses)
 
 
 class _GroundData(NamedTuple):
@@ -90,17 +86,26 @@ def _ground_data(ground: Ground) -> _GroundData:
 
 
 @lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
-def _compiled_model(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.MjModel:
+def _compiled_model(
+    robot: Robot, ground: _GroundData, timestep: float, losses: bool
+) -> mujoco.MjModel:
     """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it."""
     try:
-        return _build_spec(robot, ground, timestep).compile()
+        model = _build_spec(robot, ground, timestep, losses).compile()
     except ValueError as error:
         raise SimulationError(
             f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
         ) from None
+    if model.nv != robot.nv:
+        raise SimulationError(
+            f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
+            f"robot has {robot.nv}. Load the robot again if its model was changed after loading."
+        )
+    check_agreement(robot, model)
+    return model
 
 
-def _build_spec(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.MjSpec:
+def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool) -> mujoco.MjSpec:
     """Write the description of a model."""
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
@@ -115,12 +120,12 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.Mj
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
     for name, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
-        joint = spec.joint(name)
-        joint.armature = float(
-            robot.model.armature[robot.model.idx_vs[robot.model.getJointId(name)]]
-        )
-        joint.damping[:] = 0.0
-        joint.frictionloss = 0.0
+        joint, i = spec.joint(name), robot.model.idx_vs[robot.model.getJointId(name)]
+        joint.armature = float(robot.model.armature[i])
+        # the force of damping is linear in the velocity; MuJoCo has terms of higher order, too
+        joint.damping[:] = [losses * robot.model.damping[i], 0.0, 0.0]
+        joint.frictionloss = losses * float(robot.model.friction[i])
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the motor has the limit
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_motor()
         if np.isfinite(limit):
@@ -175,6 +180,8 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         ) from None
     spec.compiler.fusestatic, spec.compiler.discardvisual = True, False
     bodies = spec.bodies[1:]  # the first is the world
+    for body in bodies:
+        _move_joint_of_massless_link(spec, body, {body_name(foot.frame) for foot in robot.feet})
     inertias = {
         body.name: _fused_inertia(body)
         for body in bodies
@@ -197,6 +204,31 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         diagonal = tensor.diagonal() if body.explicitinertial else [np.nan, 0.0, 0.0]
         body.fullinertia = [*diagonal, tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return spec
+
+
+def _move_joint_of_massless_link(
+    spec: mujoco.MjSpec, link: mujoco.MjsBody, feet: Collection[str]
+) -> None:
+    """Let the joint of a massless link between two joints move the next link instead.
+
+    MuJoCo moves no body without mass, but several joints can move one body in succession.
+    """
+    if not link.joints or len(link.bodies) != 1 or link.name in feet:
+        return
+    body = link.bodies[0]
+    if not body.joints or _fused_inertia(link).mass > 0.0:
+        return
+    to_body = pin.SE3(rotation_matrix(body.quat), np.array(body.pos)).inverse()
+    moved = []
+    for joint in (*link.joints, *body.joints):
+        placement = to_body if joint.parent.name == link.name else pin.SE3.Identity()
+        attributes = {name: copy.copy(getattr(joint, name)) for name in _JOINT_ATTRIBUTES}
+        attributes["pos"] = placement.act(np.array(joint.pos))
+        attributes["axis"] = placement.rotation @ joint.axis
+        moved.append(attributes)
+        spec.delete(joint)
+    for attributes in moved:
+        body.add_joint(**attributes)
 
 
 def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:

@@ -17,10 +17,10 @@ _ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
 
 
 def model_data(
-    robot: Robot, ground: Ground, timestep: float, model: mujoco.MjModel
+    robot: Robot, ground: Ground, timestep: float, losses: bool, model: mujoco.MjModel
 ) -> dict[str, Any]:
     """Return a model as XML, and the fields that the XML does not store exactly."""
-    xml = build_spec(robot, ground, timestep).to_xml()
+    xml = build_spec(robot, ground, timestep, losses).to_xml()
     return {"xml": xml, "overrides": _lost_digits(model, xml)}
 
 

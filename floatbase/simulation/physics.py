@@ -51,9 +51,9 @@ class Simulation:
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each point foot one ball,
     and each flat foot a ball at each corner. Each joint gets a torque motor with the robot's torque
-    limit and rotor inertia. Joint friction and joint damping are off, as in eqs. (1)-(7); the joint
-    limits of the URDF are on. Only the feet collide with the ground; after a fall the links can
-    collide with it, too (`link_collisions`).
+    limit and rotor inertia. Joint friction and joint damping are off, as in eqs. (1)-(7), except
+    with `joint_losses`. The joint limits of the URDF are on. Only the feet collide with the ground;
+    after a fall the links can collide with it, too (`link_collisions`).
 
     Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
     copy has its own `model` and `data`.
@@ -66,11 +66,15 @@ class Simulation:
         The ground, or the coefficient of friction of level ground [-].
     timestep : float, optional
         Length of a step [s].
+    joint_losses : bool, optional
+        Whether the damping and the dry friction of the joints act that the robot's file gives, as
+        in <dynamics damping="0.1" friction="0.5"/>. The equations and the controllers ignore them.
 
     Raises
     ------
     SimulationError
-        If MuJoCo cannot build the robot.
+        If MuJoCo cannot build the robot, or if its mass, gravity, M or h differ from those of the
+        robot.
 
     Notes
     -----
@@ -89,13 +93,21 @@ class Simulation:
     _example = "fb.Simulation(robot)"
     __setattr__ = refuse_new_attributes
 
-    def __init__(self, robot: Robot, ground: Ground | float = 1.0, timestep: float = 1e-3):
+    def __init__(
+        self,
+        robot: Robot,
+        ground: Ground | float = 1.0,
+        timestep: float = 1e-3,
+        *,
+        joint_losses: bool = False,
+    ):
         self._robot = as_instance("robot", robot, Robot)
         self._thread_lock = threading.RLock()  # two threads in one MjData crash the process
         self._ground = ground if isinstance(ground, Ground) else Ground(mu=ground)
         self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
         self._feet = Contacts.feet(robot) if robot.feet else Contacts.none()
-        self._model = build_model(robot, self.ground, self.timestep)
+        self._joint_losses = as_bool("joint_losses", joint_losses)
+        self._model = build_model(robot, self.ground, self.timestep, self.joint_losses)
         self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)
         self._actuator_ids = np.array(
@@ -150,6 +162,11 @@ class Simulation:
     def timestep(self) -> float:
         """Length of a step [s]."""
         return self._timestep
+
+    @property
+    def joint_losses(self) -> bool:
+        """Whether the damping and dry friction of the joints act."""
+        return self._joint_losses
 
     @property
     def feet(self) -> Contacts:
@@ -474,7 +491,7 @@ class Simulation:
         joints = [model.joint(name) for name in robot.joint_names]
         base = [self._base_body] if robot.is_floating else []
         return {
-            **model_data(robot, self.ground, self.timestep, model),
+            **model_data(robot, self.ground, self.timestep, self.joint_losses, model),
             "fallenHeight": FALLEN_HEIGHT_FRACTION,
             "fallenCosine": FALLEN_COSINE,
             "home": {"qpos": self._qpos.tolist(), "com": self.state.com.tolist()},

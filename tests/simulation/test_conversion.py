@@ -73,9 +73,12 @@ def test_joints_without_limits_are_angles_for_mujoco_and_cosine_and_sine_for_us(
 
 
 def test_a_floating_robot_whose_root_link_is_called_world_is_built_and_falls_freely():
-    """MuJoCo would weld a link named "world" to the ground; ur5's own URDF has one."""
+    """MuJoCo would weld a link named "world" to the ground; that of ur5 gets a mass here."""
     arm = judges.load("ur5")
-    loose = fb.load_urdf(arm.urdf, package_dirs=arm.package_dirs)
+    inertia = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"'
+    inertial = f'<inertial><mass value="1"/><inertia {inertia}/></inertial>'
+    urdf = arm.urdf.replace('<link name="world" />', f'<link name="world">{inertial}</link>')
+    loose = fb.load_urdf(urdf, package_dirs=arm.package_dirs)
     assert loose.base == "world"
     sim, state = fb.Simulation(loose, timestep=1e-4), loose.random_state(0)
     sim.reset(state)
