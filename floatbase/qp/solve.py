@@ -32,6 +32,10 @@ _CONVEXITY_TOLERANCE = 1e-10
 # fraction of 1 + the largest variable by which polishing may change a variable: a larger step
 # would be more than a correction of the last digits
 _MAX_POLISHING_STEP = 1e-4
+_PROXIMAL_WEIGHT = 1e-5  # fraction of the largest |H|, of DAQP's proximal steps
+# of DAQP, some 20 ms for a humanoid; and of the fallback, about a second. Problems that can be
+# solved need a few hundred and at most 160
+_DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
@@ -68,7 +72,8 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
     "daqp" and "cvxpy" fall back to "active_set" if they find no point although no constraints are
     in conflict. "daqp" also does so if polishing its result fails, as with weights that are too far
-    apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it.
+    apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it. It ends with `SolverError`
+    after 300 iterations, about a second.
     """
     check_solver(solver)
     if len(as_instance("qp", qp, QP).soft):
@@ -81,7 +86,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     )
     if conflict:
         raise infeasible(qp.inequality_names[i] for i in conflict)
-    return _active_set(qp)
+    return _active_set(qp, _FALLBACK_ITERATIONS)
 
 
 def _solve_soft(qp: QP, solver: str) -> Solution:
@@ -93,19 +98,29 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     digits for a curvature of 1e-5. The problem is therefore solved again without them.
     """
     assert qp.penalties is not None
-    violated = np.zeros(len(qp.G), dtype=bool)
-    exact = _solve_with_known_violations(qp, violated, solver)
+    exact = _solve_with_known_violations(qp, np.zeros(len(qp.G), dtype=bool), solver)
     if exact is not None:
         return exact
-    found = solve(qp.with_slacks(), solver)
-    x = found.x[: qp.n]
-    excess = (qp.G[qp.soft] @ x - qp.h[qp.soft]) / qp.row_norms[qp.soft]
-    violated[qp.soft] = excess > violation_tolerance(qp.h[qp.soft] / qp.row_norms[qp.soft], x)
-    exact = _solve_with_known_violations(qp, violated, solver)
+    relaxed = qp.with_slacks()
+    rough = _daqp(relaxed, polish=False) if solver == "daqp" else None
+    if rough is not None:
+        exact = _solve_with_known_violations(qp, _violations(qp, rough), solver)
+        if exact is not None:
+            return exact
+    found = solve(relaxed, solver)
+    exact = _solve_with_known_violations(qp, _violations(qp, found), solver)
     if exact is not None:
         return exact
     multipliers = found.inequality_multipliers[: len(qp.G)]
-    return Solution(qp, x, multipliers, found.solver, found.iterations)
+    return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
+
+
+def _violations(qp: QP, found: Solution) -> npt.NDArray[np.bool_]:
+    """Return which soft inequalities are violated in a solution of the problem with slacks."""
+    G, h, norms, x = qp.G[qp.soft], qp.h[qp.soft], qp.row_norms[qp.soft], found.x[: qp.n]
+    violated = np.zeros(len(qp.G), dtype=bool)
+    violated[qp.soft] = (G @ x - h) / norms > violation_tolerance(h / norms, x)
+    return violated
 
 
 def _solve_with_known_violations(
@@ -163,7 +178,7 @@ def check_solver(solver: str) -> None:
         require("cvxpy", extra="cvxpy")
 
 
-def _daqp(qp: QP) -> Solution | None:
+def _daqp(qp: QP, polish: bool = True) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
     Return None if weights are so far apart that DAQP does not converge or that polishing fails.
@@ -175,16 +190,21 @@ def _daqp(qp: QP) -> Solution | None:
     if reduced.n == 0:
         return None
     scale = _objective_scale(reduced)
-    y, _, exit_flag, info = daqp.solve(
-        reduced.H / scale,
-        reduced.g / scale,
-        reduced.G / norms[:, None],
-        reduced.h / norms,
-        np.full(rows, -1e30),  # DAQP treats this as no bound
-        np.zeros(rows, dtype=np.int32),
-        primal_tol=FEASIBILITY_TOLERANCE,
-        eps_prox=-1.0,
-    )
+    # proximal steps are slower, but converge where the weights are so far apart that DAQP cycles
+    for proximal_weight in (-1.0, _PROXIMAL_WEIGHT):  # -1: no proximal steps
+        y, _, exit_flag, info = daqp.solve(
+            reduced.H / scale,
+            reduced.g / scale,
+            reduced.G / norms[:, None],
+            reduced.h / norms,
+            np.full(rows, -1e30),  # DAQP treats this as no bound
+            np.zeros(rows, dtype=np.int32),
+            primal_tol=FEASIBILITY_TOLERANCE,
+            eps_prox=proximal_weight,
+            iter_limit=_DAQP_ITERATIONS,
+        )
+        if exit_flag not in (-2, -4):  # cycling, too many iterations
+            break
     if exit_flag == -3:
         raise unbounded(qp)
     if exit_flag == -5:
@@ -192,15 +212,21 @@ def _daqp(qp: QP) -> Solution | None:
     if exit_flag not in (1, 2):
         # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
         return None
-    polished = _polished(
-        qp, np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-    )
-    return None if polished is None else Solution(qp, *polished, "daqp", int(info["iterations"]))
+    y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
+    point: tuple[Array, Array] | None
+    point = _polished(qp, y, mu) if polish else (qp.equality_space(y), mu)
+    return None if point is None else Solution(qp, *point, "daqp", int(info["iterations"]))
 
 
-def _active_set(qp: QP) -> Solution:
+def _active_set(qp: QP, max_iterations: int | None = None) -> Solution:
     """Solve from a cold start with `active_set` and polish the result."""
-    solution, space = active_set(qp).solution, qp.equality_space
+    run, space = active_set(qp, max_iterations=max_iterations), qp.equality_space
+    if not run.converged:
+        raise SolverError(
+            f"No solver found the optimum of {qp!r} in {max_iterations} iterations. Its weights "
+            f"are probably too far apart, or the robot's state is far from any that it can control."
+        )
+    solution = run.solution
     polished = _polished(qp, space.A.T @ (solution.x - space.b), solution.inequality_multipliers)
     return (
         solution
