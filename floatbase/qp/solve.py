@@ -213,9 +213,11 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
         # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
         return None
     y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-    point: tuple[Array, Array] | None
-    point = _polished(qp, y, mu) if polish else (qp.equality_space(y), mu)
-    return None if point is None else Solution(qp, *point, "daqp", int(info["iterations"]))
+    iterations = int(info["iterations"])
+    if not polish:
+        return Solution(qp, qp.equality_space(y), mu, "daqp", iterations)
+    polished = _polished(qp, y, mu)
+    return None if polished is None else Solution(qp, *polished, "daqp", iterations)
 
 
 def _active_set(qp: QP, max_iterations: int | None = None) -> Solution:

@@ -24,6 +24,8 @@ from floatbase.robots._checks import joint_limits
 MAX_FEET_WITH_SWAY = 4
 # fraction of a straight leg's length that a walk uses: a straight leg cannot lift or press its foot
 _MAX_EXTENSION = 0.9
+# sine of the angle between the desired velocity and the directions in which a leg moves its foot
+_MAX_SIDEWAYS = 0.5
 _GRID_SIZE = 25  # positions of a joint that the search for the longest leg tries
 _SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot of the catalogue
 
@@ -91,6 +93,22 @@ def slow_message(walk: _Walking, gait: Gait, fraction: float) -> str:
         f"{walk.robot.name} cannot make steps that are long enough for {walk!r}. It walks at "
         f"{x:.3g} and {y:.3g} m/s, and turns at {fraction * walk.yaw_rate:.3g} rad/s. Use a gait "
         f"with a shorter period than {gait.period:g} s."
+    )
+
+
+def stuck_message(walk: _Walking, gait: Gait, state: State) -> str:
+    """Return a warning if the legs cannot move the feet along the desired velocity, else ""."""
+    direction = np.append(walk.velocity, 0.0) / (np.linalg.norm(walk.velocity) or 1.0)
+    stuck = []
+    for foot in gait.feet:
+        J = state.frame_jacobian(foot)[:3, 6:]
+        if np.linalg.norm(direction - J @ (np.linalg.pinv(J) @ direction)) > _MAX_SIDEWAYS:
+            stuck.append(foot)
+    if not stuck:
+        return ""
+    return (
+        f"{walk!r} hardly moves in this direction, because the legs of {', '.join(stuck)} cannot "
+        f"move their feet along it. Choose another velocity."
     )
 
 
