@@ -86,29 +86,31 @@ class _Walking(Protocol):
         """Desired yaw rate [rad/s]."""
 
 
-def slow_message(walk: _Walking, gait: Gait, fraction: float) -> str:
-    """Return the warning for a walk that is limited to a fraction of its desired motion."""
+def motion_message(walk: _Walking, gait: Gait, state: State, fraction: float) -> str:
+    """Return the warning for a walk that does not move as desired, else "".
+
+    Either its legs cannot move the feet along the desired velocity, as solo8's to the side, or it
+    is limited to a fraction of the desired motion. state: the standing state.
+    """
+    direction = np.append(walk.velocity, 0.0) / (np.linalg.norm(walk.velocity) or 1.0)
+    jacobians = {foot: state.frame_jacobian(foot)[:3, 6:] for foot in gait.feet}
+    stuck = [
+        foot
+        for foot, J in jacobians.items()
+        if np.linalg.norm(direction - J @ (np.linalg.pinv(J) @ direction)) > _MAX_SIDEWAYS
+    ]
+    if stuck:
+        return (
+            f"{walk!r} hardly moves in this direction, because the legs of {', '.join(stuck)} "
+            f"cannot move their feet along it. Choose another velocity."
+        )
+    if fraction == 1.0:
+        return ""
     x, y = fraction * walk.velocity
     return (
         f"{walk.robot.name} cannot make steps that are long enough for {walk!r}. It walks at "
         f"{x:.3g} and {y:.3g} m/s, and turns at {fraction * walk.yaw_rate:.3g} rad/s. Use a gait "
         f"with a shorter period than {gait.period:g} s."
-    )
-
-
-def stuck_message(walk: _Walking, gait: Gait, state: State) -> str:
-    """Return a warning if the legs cannot move the feet along the desired velocity, else ""."""
-    direction = np.append(walk.velocity, 0.0) / (np.linalg.norm(walk.velocity) or 1.0)
-    stuck = []
-    for foot in gait.feet:
-        J = state.frame_jacobian(foot)[:3, 6:]
-        if np.linalg.norm(direction - J @ (np.linalg.pinv(J) @ direction)) > _MAX_SIDEWAYS:
-            stuck.append(foot)
-    if not stuck:
-        return ""
-    return (
-        f"{walk!r} hardly moves in this direction, because the legs of {', '.join(stuck)} cannot "
-        f"move their feet along it. Choose another velocity."
     )
 
 

@@ -23,12 +23,7 @@ from floatbase.behaviours.terrain import Terrain
 from floatbase.behaviours.walk.active_plan import ActivePlan
 from floatbase.behaviours.walk.footholds import raibert_foothold
 from floatbase.behaviours.walk.gait import Gait
-from floatbase.behaviours.walk.gait_limits import (
-    check_friction,
-    slow_message,
-    speed_fractions,
-    stuck_message,
-)
+from floatbase.behaviours.walk.gait_limits import check_friction, motion_message, speed_fractions
 from floatbase.behaviours.walk.lipm import CoMPlan
 from floatbase.behaviours.walk.options import (
     Gains,
@@ -503,9 +498,7 @@ class Walk:
         self._speeds = speed_fractions(
             self._gait, self._posture, self._options.reach, motion, self._options.acceleration[0]
         )
-        message = stuck_message(self, self._gait, self._posture.state)
-        if not message and self.speed_fraction < 1.0:
-            message = slow_message(self, self._gait, self.speed_fraction)
+        message = motion_message(self, self._gait, self._posture.state, self.speed_fraction)
         if message:
             warnings.warn(message, SimulationWarning, stacklevel=stacklevel)
         self._refresh()
