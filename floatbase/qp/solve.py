@@ -33,8 +33,8 @@ _CONVEXITY_TOLERANCE = 1e-10
 # would be more than a correction of the last digits
 _MAX_POLISHING_STEP = 1e-4
 _PROXIMAL_WEIGHT = 1e-5  # fraction of the largest |H|, of DAQP's proximal steps
-# of DAQP, some 20 ms for a humanoid; and of the fallback, about a second. Problems that can be
-# solved need a few hundred and at most 160
+# DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
+# 4 s on a loaded machine, and it was never seen to need more than 155
 _DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
 
 
@@ -73,7 +73,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     "daqp" and "cvxpy" fall back to "active_set" if they find no point although no constraints are
     in conflict. "daqp" also does so if polishing its result fails, as with weights that are too far
     apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it. It ends with `SolverError`
-    after 300 iterations, about a second.
+    after 300 iterations, which take a few seconds for a humanoid.
     """
     check_solver(solver)
     if len(as_instance("qp", qp, QP).soft):
