@@ -73,9 +73,9 @@ class WholeBodyController:
         `floatbase.objectives.Task`. Their weights decide between them. A list of lists sets strict
         priorities instead: the first list has the highest priority, and each list is fulfilled as
         well as the lists before it allow. Only the reference backend supports priorities. If no
-        task acts on forces, or none on torques, a `ForceTask()` or a `TorqueTask()` of small weight
-        is added, so that the optimum is unique. A `CentreOfPressureTask` does not count here, since
-        it leaves most forces open.
+        task acts on forces, or none on torques, a `ForceTask` or a `TorqueTask` of small weight is
+        added (`floatbase.objectives.effort_weight`), so that the optimum is unique. A
+        `CentreOfPressureTask` does not count here, since it leaves most forces open.
     facets : int, optional
         Number of facets of the friction polyhedra; see `floatbase.friction.FrictionPolyhedron`.
     inner_approximation : bool, optional

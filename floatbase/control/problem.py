@@ -32,7 +32,13 @@ from floatbase.dynamics import (
     resolved_constraint,
 )
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
-from floatbase.objectives import CentreOfPressureTask, ForceTask, Task, TorqueTask
+from floatbase.objectives import (
+    CentreOfPressureTask,
+    ForceTask,
+    Task,
+    TorqueTask,
+    effort_weight,
+)
 from floatbase.qp import QP, ConstraintLabel, Solution, solve
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
@@ -55,9 +61,10 @@ class Problem(Value):
     contacts : Contacts
         Contacts of the robot with the ground.
     tasks : sequence of Task, or sequence of sequences of Task
-        Tasks, or levels of tasks with strict priorities, the highest first. A `ForceTask()` or a
-        `TorqueTask()` of small weight is added, to the last level, if no task acts on forces, or
-        none on torques. A `CentreOfPressureTask` does not count, since it leaves most forces open.
+        Tasks, or levels of tasks with strict priorities, the highest first. A `ForceTask` or a
+        `TorqueTask` of weight `effort_weight` is added, to the last level, if no task acts on
+        forces, or none on torques. A `CentreOfPressureTask` does not count, since it leaves most
+        forces open.
         The attribute is the list of all tasks.
     limits : Limits
         Inequality constraints.
@@ -87,7 +94,7 @@ class Problem(Value):
         super().__post_init__()
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
-        tasks, sizes = _with_regularisation(self.tasks)
+        tasks, sizes = _with_regularisation(self.robot, self.tasks)
         if not isinstance(self.level_sizes, list | tuple):
             raise InputError(
                 f"level_sizes must be a list of integers, not {short_repr(self.level_sizes)}."
@@ -372,7 +379,7 @@ def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
     return equations_of_motion(robot.standing(), contacts)
 
 
-def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
+def _with_regularisation(robot: Robot, tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
     """Return the tasks with small regularization tasks where they are missing, and level sizes.
 
     A `ForceTask` or `TorqueTask` is added if no task determines the forces, or none the torques.
@@ -402,7 +409,7 @@ def _with_regularisation(tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[
             )
         as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
     missing = [
-        kind()
+        kind(weight=effort_weight(robot))
         for kind in (ForceTask, TorqueTask)
         if not any(
             task.block == kind.block and not isinstance(task, CentreOfPressureTask)

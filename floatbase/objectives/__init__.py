@@ -36,7 +36,7 @@ from floatbase.objectives.pullback import (
     minimum_norm_pullback,
     partial_minimum,
 )
-from floatbase.objectives.regularisation import ForceTask, TorqueTask
+from floatbase.objectives.regularisation import ForceTask, TorqueTask, effort_weight
 from floatbase.objectives.relative_pose import RelativePoseTask
 
 # fmt: off
@@ -44,8 +44,8 @@ __all__ = [
     "AngularMomentumTask", "AxisTask", "CentreOfPressureTask", "CoMTask", "ForceTask", "FrameTask",
     "OrientationTask", "PostureTask", "RelativePoseTask", "Task", "TorqueTask", "TorquesFromForces",
     "argmin_coordinates", "centroidal_inertia", "centroidal_momentum", "centroidal_momentum_rate",
-    "com_wrench_map", "cost_on_space", "desired_wrench", "force_bias", "minimum_norm_coordinates",
-    "minimum_norm_pullback", "net_force_matrix", "net_moment_matrix", "normal_bias",
-    "partial_minimum", "standing_tasks", "tangential_bias", "torques_from_forces",
+    "com_wrench_map", "cost_on_space", "desired_wrench", "effort_weight", "force_bias",
+    "minimum_norm_coordinates", "minimum_norm_pullback", "net_force_matrix", "net_moment_matrix",
+    "normal_bias", "partial_minimum", "standing_tasks", "tangential_bias", "torques_from_forces",
     "wrench_objective",
 ]  # fmt: skip

@@ -5,10 +5,37 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from floatbase._validation import Array, as_forces
+from floatbase._validation import Array, as_forces, as_instance
 from floatbase.affine import Affine
 from floatbase.dynamics import Block, EquationsOfMotion
 from floatbase.objectives._task import Shape, Shapes, Target, TargetTask
+from floatbase.robots import Robot
+
+_WEIGHT = 1e-5  # 1/N² and 1/(N·m)²
+# N: with the weight 1e-5, standing robots of more weight sag, since forces cost more than motion
+_MAX_LOAD = 400.0
+
+
+def effort_weight(robot: Robot) -> float:
+    """Return the weight of the force and torque tasks that a controller adds by itself.
+
+    The cost of the forces that carry a robot grows with the square of the robot's weight, but the
+    cost of an acceleration does not grow. Above a robot's weight of 400 N, about 40 kg, the weight
+    of the tasks therefore falls with its square. A standing robot of any mass then plans forces
+    that carry it, to 1 part in 1000.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    float
+        1e-5, or less for a heavy robot [1/N² and 1/(N·m)²].
+    """
+    weight = as_instance("robot", robot, Robot, 'fb.load("go2")').weight
+    return _WEIGHT * (_MAX_LOAD / max(weight, _MAX_LOAD)) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +43,7 @@ class _BlockTask(TargetTask):
     """Base of tasks that keep a block x of (q̈, τ, λ) near a target, zero by default."""
 
     target: Target | None = None
-    weight: float = 1e-5
+    weight: float = _WEIGHT
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """Compute the residual x - target."""

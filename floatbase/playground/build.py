@@ -25,6 +25,7 @@ from floatbase.objectives import (
     PostureTask,
     Task,
     TorqueTask,
+    effort_weight,
     standing_tasks,
 )
 from floatbase.playground.equation import EQUATION
@@ -158,7 +159,7 @@ def _tasks(settings: Settings, state: State) -> list[Task]:
         PostureTask(state.q, weight=six_digits(1e-3 * posture)),
     ]
     if effort != 1.0:
-        weight = six_digits(1e-5 * effort)
+        weight = six_digits(effort_weight(state.robot) * effort)
         tasks += [ForceTask(weight=weight), TorqueTask(weight=weight)]
     return tasks + [
         FrameTask(name, state.point(name) + [0.0, 0.0, LIFT_HEIGHT])

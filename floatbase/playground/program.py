@@ -8,6 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 from floatbase.errors import FloatbaseError
+from floatbase.objectives import effort_weight
 from floatbase.playground import build
 from floatbase.playground.perturbed import Perturbation
 from floatbase.playground.settings import IDEAL_BANDWIDTH, IDEAL_KP, Settings, six_digits
@@ -117,7 +118,7 @@ def _controller(settings: Settings, robot: Robot) -> list[str]:
             f"controller = Stand(robot, contacts, gait{options})",
         ]
     else:
-        lines += _standing(settings)
+        lines += _standing(settings, robot)
         options += ", joint_limits=None"
         lines.append(f"controller = fb.WholeBodyController(robot, contacts, tasks{options})")
     if "zeros" in settings.actual_off:
@@ -126,7 +127,7 @@ def _controller(settings: Settings, robot: Robot) -> list[str]:
     return lines
 
 
-def _standing(settings: Settings) -> list[str]:
+def _standing(settings: Settings, robot: Robot) -> list[str]:
     """Return the lines that make `tasks`, and `contacts` without lifted feet."""
     motion, posture, effort = settings.weights
     weight = f", weight={_literal(six_digits(10.0 * motion))}" if motion != 1.0 else ""
@@ -146,7 +147,7 @@ def _standing(settings: Settings) -> list[str]:
         "tasks = [com, level, posture]",
     ]
     if effort != 1.0:
-        weight = f"weight={_literal(six_digits(1e-5 * effort))}"
+        weight = f"weight={_literal(six_digits(effort_weight(robot) * effort))}"
         lines.append(f"tasks += [fb.ForceTask({weight}), fb.TorqueTask({weight})]")
     if settings.lifted_feet:
         names = list(settings.lifted_feet)

@@ -38,6 +38,9 @@ _STATIONARITY = 1e-12  # fraction of its largest term that the slope at an optim
 # of the distance from the last point, which DAQP adds to an objective without curvature in some
 # direction, relative to the largest curvature: a larger one takes thousands of iterations
 _PROXIMAL_WEIGHT = 1e-6
+# DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
+# 4 s on a loaded machine, and it was never seen to need more than 155
+_DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
@@ -74,7 +77,8 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
 
     "daqp" and "cvxpy" fall back to "active_set" if they find no point although no constraints are
     in conflict. "daqp" also does so if polishing its result fails, as with weights that are too far
-    apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it.
+    apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it. It ends with `SolverError`
+    after 300 iterations, which take a few seconds for a humanoid.
     """
     check_solver(solver)
     if len(as_instance("qp", qp, QP).soft):
@@ -87,7 +91,7 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     )
     if conflict:
         raise infeasible(qp.inequality_names[i] for i in conflict)
-    return _active_set(qp)
+    return _active_set(qp, max_iterations=_FALLBACK_ITERATIONS)
 
 
 def _solve_soft(qp: QP, solver: str) -> Solution:
@@ -99,19 +103,29 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     digits for a curvature of 1e-5. The problem is therefore solved again without them.
     """
     assert qp.penalties is not None
-    violated = np.zeros(len(qp.G), dtype=bool)
-    exact = _solve_with_known_violations(qp, violated, solver)
+    exact = _solve_with_known_violations(qp, np.zeros(len(qp.G), dtype=bool), solver)
     if exact is not None:
         return exact
-    found = solve(qp.with_slacks(), solver)
-    x = found.x[: qp.n]
-    excess = (qp.G[qp.soft] @ x - qp.h[qp.soft]) / qp.row_norms[qp.soft]
-    violated[qp.soft] = excess > violation_tolerance(qp.h[qp.soft] / qp.row_norms[qp.soft], x)
-    exact = _solve_with_known_violations(qp, violated, solver)
+    relaxed = qp.with_slacks()
+    rough = _daqp(relaxed, polish=False) if solver == "daqp" else None
+    if rough is not None:
+        exact = _solve_with_known_violations(qp, _violations(qp, rough), solver)
+        if exact is not None:
+            return exact
+    found = solve(relaxed, solver)
+    exact = _solve_with_known_violations(qp, _violations(qp, found), solver)
     if exact is not None:
         return exact
     multipliers = found.inequality_multipliers[: len(qp.G)]
-    return Solution(qp, x, multipliers, found.solver, found.iterations)
+    return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
+
+
+def _violations(qp: QP, found: Solution) -> npt.NDArray[np.bool_]:
+    """Return which soft inequalities are violated in a solution of the problem with slacks."""
+    G, h, norms, x = qp.G[qp.soft], qp.h[qp.soft], qp.row_norms[qp.soft], found.x[: qp.n]
+    violated = np.zeros(len(qp.G), dtype=bool)
+    violated[qp.soft] = (G @ x - h) / norms > violation_tolerance(h / norms, x)
+    return violated
 
 
 def _solve_with_known_violations(
@@ -169,7 +183,7 @@ def check_solver(solver: str) -> None:
         require("cvxpy", extra="cvxpy")
 
 
-def _daqp(qp: QP) -> Solution | None:
+def _daqp(qp: QP, polish: bool = True) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
     If polishing fails, `active_set` continues from DAQP's result. Return None if weights are so far
@@ -183,16 +197,21 @@ def _daqp(qp: QP) -> Solution | None:
         only = _polished(qp, np.zeros(0), np.zeros(rows))
         return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
-    y, _, exit_flag, info = daqp.solve(
-        reduced.H / scale,
-        reduced.g / scale,
-        reduced.G / norms[:, None],
-        reduced.h / norms,
-        np.full(rows, -1e30),  # DAQP treats this as no bound
-        np.zeros(rows, dtype=np.int32),
-        primal_tol=FEASIBILITY_TOLERANCE,
-        eps_prox=-_PROXIMAL_WEIGHT,
-    )
+    # proximal steps in all directions are slower, but do not cycle where weights are far apart
+    for proximal_weight in (-_PROXIMAL_WEIGHT, _PROXIMAL_WEIGHT):  # < 0: only without curvature
+        y, _, exit_flag, info = daqp.solve(
+            reduced.H / scale,
+            reduced.g / scale,
+            reduced.G / norms[:, None],
+            reduced.h / norms,
+            np.full(rows, -1e30),  # DAQP treats this as no bound
+            np.zeros(rows, dtype=np.int32),
+            primal_tol=FEASIBILITY_TOLERANCE,
+            eps_prox=proximal_weight,
+            iter_limit=_DAQP_ITERATIONS,
+        )
+        if exit_flag not in (-2, -4):  # cycling, too many iterations
+            break
     if exit_flag == -3:
         raise unbounded(qp)
     if exit_flag == -5:
@@ -201,13 +220,22 @@ def _daqp(qp: QP) -> Solution | None:
         # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
         return None
     y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
+    iterations = int(info["iterations"])
+    if not polish:
+        return Solution(qp, qp.equality_space(y), mu, "daqp", iterations)
     polished = _polished(qp, y, mu)
     if polished is None:
-        return _active_set(qp, y, [qp.inequality_names[i] for i in np.flatnonzero(mu)])
-    return Solution(qp, *polished, "daqp", int(info["iterations"]))
+        guess = [qp.inequality_names[i] for i in np.flatnonzero(mu)]
+        return _active_set(qp, y, guess, _FALLBACK_ITERATIONS)
+    return Solution(qp, *polished, "daqp", iterations)
 
 
-def _active_set(qp: QP, y: Array | None = None, working_set: Sequence[str] = ()) -> Solution:
+def _active_set(
+    qp: QP,
+    y: Array | None = None,
+    working_set: Sequence[str] = (),
+    max_iterations: int | None = None,
+) -> Solution:
     """Solve with `active_set` from a guess in the coordinates of `qp.reduced`; polish the result.
 
     Without a guess, the search starts at y = 0 if this point satisfies all rows.
@@ -215,7 +243,13 @@ def _active_set(qp: QP, y: Array | None = None, working_set: Sequence[str] = ())
     space = qp.equality_space
     if y is None and np.all(qp.reduced.h >= 0.0):
         y = np.zeros(qp.reduced.n)
-    solution = active_set(qp, None if y is None else space(y), working_set).solution
+    run = active_set(qp, None if y is None else space(y), working_set, max_iterations)
+    if not run.converged:
+        raise SolverError(
+            f"No solver found the optimum of {qp!r} in {max_iterations} iterations. Its weights "
+            f"are probably too far apart, or the robot's state is far from any that it can control."
+        )
+    solution = run.solution
     polished = _polished(qp, space.A.T @ (solution.x - space.b), solution.inequality_multipliers)
     return (
         solution

@@ -27,6 +27,7 @@ from floatbase._validation import (
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
+from floatbase.robots.plausibility import warn_if_it_cannot_stand
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 from floatbase.robots.urdf import (
@@ -104,7 +105,8 @@ def load(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture.
+        If the motors are too weak to hold the robot in its posture or on its feet, or if the robot
+        is upside down.
 
     Examples
     --------
@@ -165,6 +167,7 @@ def load(
         sources=entry.sources,
     )
     _warn_if_motors_are_weak(robot)
+    warn_if_it_cannot_stand(robot)
     return robot
 
 
@@ -245,9 +248,10 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture, if no posture is
-        given and a leg of a floating-base robot is straight or otherwise singular, if only some
-        joints have a torque limit, or if the URDF has settings for MuJoCo, which are ignored.
+        If the motors are too weak to hold the robot in its posture or on its feet, if the robot is
+        upside down, if its lengths are probably not in metres, if no posture is given and a leg of
+        a floating-base robot is straight or otherwise singular, if only some joints have a torque
+        limit, or if the URDF has settings for MuJoCo, which are ignored.
 
     Notes
     -----
@@ -286,6 +290,7 @@ def load_urdf(
         feet=_as_feet(feet, foot_radius),
     )
     _warn_if_motors_are_weak(robot)
+    warn_if_it_cannot_stand(robot)
     if posture is None:
         _warn_if_legs_are_singular(robot)
     if torque_limits is None:

@@ -12,6 +12,7 @@ import os
 import pickle
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
@@ -735,3 +736,24 @@ def test_six_feet_walk_slowly_within_the_reach_of_their_legs(velocity):
     """The legs were stretched at lift-off, and the posture task disturbed the centre of mass."""
     record = run(tripod(velocity, period=1.0, swing=0.4, yaw_rate=0.5), 4.2)
     assert record.outcome == "completed" and tilt(record) < 2.0
+
+
+def test_legs_without_an_ankle_roll_joint_walk():
+    """With soles that must stay flat, the body cannot sway, and the robot fell within 2.5 s."""
+    rolls = ["left_ankle_roll_joint", "right_ankle_roll_joint"]
+    robot = fb.load("g1", locked=rolls)
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot), (0.2, 0.0))
+    record = run(walk, 4.0)
+    assert record.outcome == "completed"
+    assert record.final.com[0] - robot.standing().com[0] == pytest.approx(0.6, abs=0.1)
+
+
+def test_a_velocity_along_which_the_legs_cannot_move_is_reported():
+    with warns(SimulationWarning, "solo8", "FL_FOOT", 0.2):
+        walk = walk_of("solo8", Gait.trot, (0.0, 0.2))
+    with warns(SimulationWarning, "solo8", "FL_FOOT"):
+        walk.velocity = (0.1, 0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        walk.velocity = (0.2, 0.0)
+        walk_of("solo12", Gait.trot, (0.0, 0.2))

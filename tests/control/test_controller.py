@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import copy
+import re
+from dataclasses import replace
 from itertools import pairwise
+from time import process_time
 
 import judges
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
+from floatbase.control import JointLimits
 from floatbase.errors import InfeasibleError, UnknownNameError
 from floatbase.qp import Solution, solve
 from floatbase.robots import State
@@ -451,3 +455,45 @@ def test_an_infeasible_tick_is_answered_with_soft_constraints_on_request(backend
         fb.WholeBodyController(robot, contacts, tasks, **weak)(moving.q, moving.v)
     with raises(UnknownNameError, "on_infeasible", "soft", "soften"):
         fb.WholeBodyController(robot, contacts, tasks, on_infeasible="soft")
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_a_robot_of_any_mass_plans_forces_that_carry_it_and_withstands_a_push(name):
+    """With weights that do not follow the robot's, 480 kg planned 0.946 of it, and 5 t fell."""
+    robot = judges.load(name)
+    for mass in (0.01, 80.0, 5000.0):
+        factor = mass / robot.mass
+        scaled = robot.with_scaled_mass(factor)
+        scaled = replace(
+            scaled,
+            torque_limits=factor * robot.torque_limits,
+            # MuJoCo reads them, too
+            urdf=re.sub('effort="[^"]*"', f'effort="{factor * 1e4}"', scaled.urdf),
+        )
+        state, contacts = scaled.standing(), judges.stance(scaled)
+        controller = fb.WholeBodyController(scaled, contacts, fb.standing_tasks(state))
+        planned = controller(state.q, state.v).forces.reshape(-1, 3)[:, 2].sum()
+        assert planned == pytest.approx(scaled.weight, rel=1e-3)
+        push = fb.Push([0.0, 0.2 * scaled.weight, 0.0], start=0.1)
+        record = fb.rollout(fb.Simulation(scaled), controller, 0.8, [push], 4e-3)
+        assert record.outcome == "completed"
+        assert np.linalg.norm(record.final.com - state.com) < 0.02
+
+
+def test_a_soft_problem_far_from_any_state_that_can_be_controlled_is_solved_quickly():
+    """Weights far apart made DAQP cycle: each of these steps took 0.5 s, and others 15 s."""
+    rolls = ["left_ankle_roll_joint", "right_ankle_roll_joint"]
+    robot = fb.load("g1", locked=rolls)
+    contacts, tasks = fb.Contacts.feet(robot), fb.standing_tasks(robot.standing())
+    controller = fb.WholeBodyController(
+        robot, contacts.only(contacts.names[0]), tasks, contact_weight=1e4,
+        joint_limits=JointLimits.of(robot, weight=10.0), backend="reference",
+    )  # fmt: skip
+    seconds = []
+    for seed in (0, 1, 2, 7, 8, 10):
+        state = robot.random_state(seed, spread=0.5)
+        start = process_time()
+        command = controller(state.q, 60.0 * state.v)
+        seconds.append(process_time() - start)
+        assert command.solution.residuals.equality < 1e-5
+    assert min(seconds) < 0.25

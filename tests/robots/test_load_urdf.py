@@ -3,6 +3,7 @@ cannot be used.
 """
 
 import pickle
+import re
 import warnings
 from pathlib import Path
 
@@ -232,3 +233,53 @@ def test_straight_legs_are_reported_if_no_posture_is_given(name):
             return
     with warns(RobotWarning, "posture", feet[0].frame, robot.d):
         fb.load_urdf(robot.urdf, feet=feet)
+
+
+def go2_again(**options):
+    go2 = judges.load("go2")
+    options = {"feet": list(go2.feet), "posture": go2.posture, **options}
+    return fb.load_urdf(options.pop("urdf", go2.urdf), **options)
+
+
+@pytest.mark.parametrize("base", [[1.0, 0.0, 0.0, 0.0], [0.95, 0.0, 0.1, 0.3]])
+@pytest.mark.parametrize("feet", [True, False])
+def test_a_quaternion_in_the_order_of_mujoco_is_reported(base, feet):
+    joints = judges.load("go2").posture[7:]
+    options = {} if feet else {"feet": []}
+    with warns(RobotWarning, "go2", "x, y, z, w"):
+        posture = [0.0, 0.0, 0.3, *base / np.linalg.norm(base), *joints]
+        go2_again(name="go2", posture=posture, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        posture[3:7] = np.roll(posture[3:7], -1)
+        go2_again(posture=posture, **options)
+
+
+def test_motors_that_cannot_carry_a_floating_robot_are_reported_and_just_enough_is_no_fault():
+    go2 = judges.load("go2")
+    state, contacts = go2.standing(), judges.stance(go2)
+    tau = fb.WholeBodyController(go2, contacts, fb.standing_tasks(state))(state.q, state.v).tau
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        go2_again(torque_limits=1.02 * np.abs(tau))
+    with warns(RobotWarning, "robot", "FL_calf_joint"):
+        go2_again(torque_limits=0.5 * np.abs(tau).max() * np.ones(12))
+    grams = go2.with_scaled_mass(1000.0).urdf
+    with warns(RobotWarning, "robot", "FL_calf_joint"):
+        go2_again(urdf=grams, torque_limits=go2.torque_limits)
+
+
+@pytest.mark.parametrize(("unit", "reported"), [(1.0, False), (39.4, True), (100.0, True)])
+def test_lengths_that_are_not_in_metres_are_reported(unit, reported):
+    urdf = re.sub(
+        r'(<origin[^>]*xyz=")([^"]*)',
+        lambda found: found[1] + " ".join(str(unit * float(x)) for x in found[2].split()),
+        judges.load("solo12").urdf,
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fb.load_urdf(urdf, name="solo12")
+    messages = [str(each.message) for each in caught if each.category is RobotWarning]
+    assert ["solo12" in message and "metres" in message for message in messages] == [
+        True
+    ] * reported

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import floor, inf
 from types import MappingProxyType
 
@@ -19,12 +20,23 @@ from floatbase._validation import (
     checked,
 )
 from floatbase.errors import InputError, unknown_name
-from floatbase.robots import Robot
+from floatbase.linear_algebra import rank
+from floatbase.robots import Robot, State
 
 # s: times of a schedule that differ by less count as equal, because sums of periods are rounded
 TIME_TOLERANCE = 1e-9
 _MAX_PERIOD = 100.0  # s, of a period: a larger number must be in another unit
 _MAX_PHASES = 1000  # periods of constant stance in one call
+
+
+@lru_cache(maxsize=64)
+def can_keep_flat(robot: Robot, soles: tuple[str, ...]) -> bool:
+    """Return whether the legs can keep soles flat while the body moves in any direction.
+
+    Legs with fewer than six independent joints cannot, such as legs without an ankle roll joint.
+    """
+    bent = State(robot, State(robot, robot.posture).integrate(np.linspace(0.1, 0.5, robot.nv)))
+    return all(rank(bent.frame_jacobian(sole)[:, 6:]) == 6 for sole in soles)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,15 +168,16 @@ class Gait(Value):
 
         A quadruped's feet swing in the order of `crawl`, without a pause. A biped on flat feet
         pauses on both feet. A biped on balls or points cannot stand still, so it begins to walk at
-        once, with short swings.
+        once, with short swings. A biped whose legs cannot keep its soles flat, for example without
+        an ankle roll joint, also makes short swings.
 
         Parameters
         ----------
         robot : Robot
             A robot with two or four feet.
         swing : float, optional
-            Time that a foot spends in the air [s]; by default 0.25, 0.6 for a biped on flat feet,
-            and 0.15 for a biped on points.
+            Time that a foot spends in the air [s]; by default 0.25, 0.6 for a biped whose soles
+            stay flat, and 0.15 for a biped on points.
         pause : float, optional
             Time on all feet after each swing [s]; by default 0, or 0.1 for a biped on flat feet.
         start : float, optional
@@ -181,10 +194,11 @@ class Gait(Value):
                 f"{robot.name} has {len(names)} feet, but Gait.walk needs two or four. Make its "
                 f"gait with Gait(offsets, …)."
             )
-        flat = any(foot.corners is not None for foot in robot.feet)
         values: tuple[float, float, float] = (0.25, 0.0, 1.0)
         if len(names) == 2:
-            values = (0.6, 0.1, 1.0) if flat else (0.15, 0.0, 0.0)
+            soles = tuple(foot.frame for foot in robot.feet if foot.is_flat)
+            flat_swing = 0.6 if can_keep_flat(robot, soles) else 0.25
+            values = (flat_swing, 0.1, 1.0) if soles else (0.15, 0.0, 0.0)
         swing, pause, start = (
             default if given is None else given
             for default, given in zip(values, (swing, pause, start), strict=True)

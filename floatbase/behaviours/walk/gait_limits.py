@@ -24,6 +24,8 @@ from floatbase.robots._checks import joint_limits
 MAX_FEET_WITH_SWAY = 4
 # fraction of a straight leg's length that a walk uses: a straight leg cannot lift or press its foot
 _MAX_EXTENSION = 0.9
+# sine of the angle between the desired velocity and the directions in which a leg moves its foot
+_MAX_SIDEWAYS = 0.5
 _GRID_SIZE = 25  # positions of a joint that the search for the longest leg tries
 _SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot of the catalogue
 
@@ -84,8 +86,26 @@ class _Walking(Protocol):
         """Desired yaw rate [rad/s]."""
 
 
-def slow_message(walk: _Walking, gait: Gait, fraction: float) -> str:
-    """Return the warning for a walk that is limited to a fraction of its desired motion."""
+def motion_message(walk: _Walking, gait: Gait, state: State, fraction: float) -> str:
+    """Return the warning for a walk that does not move as desired, else "".
+
+    Either its legs cannot move the feet along the desired velocity, as solo8's to the side, or it
+    is limited to a fraction of the desired motion. state: the standing state.
+    """
+    direction = np.append(walk.velocity, 0.0) / (np.linalg.norm(walk.velocity) or 1.0)
+    jacobians = {foot: state.frame_jacobian(foot)[:3, 6:] for foot in gait.feet}
+    stuck = [
+        foot
+        for foot, J in jacobians.items()
+        if np.linalg.norm(direction - J @ (np.linalg.pinv(J) @ direction)) > _MAX_SIDEWAYS
+    ]
+    if stuck:
+        return (
+            f"{walk!r} hardly moves in this direction, because the legs of {', '.join(stuck)} "
+            f"cannot move their feet along it. Choose another velocity."
+        )
+    if fraction == 1.0:
+        return ""
     x, y = fraction * walk.velocity
     return (
         f"{walk.robot.name} cannot make steps that are long enough for {walk!r}. It walks at "

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from floatbase.behaviours.walk.active_plan import compile_targets
-from floatbase.behaviours.walk.gait import Gait
+from floatbase.behaviours.walk.gait import Gait, can_keep_flat
 from floatbase.behaviours.walk.options import WalkOptions
 from floatbase.behaviours.walk.plan import StepPlan
 from floatbase.behaviours.walk.posture import WalkingPosture
@@ -21,6 +21,8 @@ _RAMP_LOAD_FACTOR = 2.0  # times its share of the weight: the normal force at wh
 # per rad/s²: the weight of a task. A knee that touches its stop is better than a fall: of 24
 # pushes of 200 to 300 N, go2 survives 24 with this weight, 22 with 200 and 13 with 10 000
 _JOINT_LIMIT_WEIGHT = 10.0
+# of the contacts of legs that cannot keep a sole flat: as for tasks, so that the body can sway
+_ROLLING_SOLE_WEIGHT = 10.0
 
 
 class StanceControllers:
@@ -40,6 +42,8 @@ class StanceControllers:
             name: (contacts.only(name), full_load / len(contacts.only(name).point_names))
             for name in contacts.names
         }
+        flat = can_keep_flat(robot, tuple(posture.flat_feet))
+        self._soft_soles = {} if flat else {"contact_weight": _ROLLING_SOLE_WEIGHT}
         # reports wrong options and tasks
         self.limits = WholeBodyController(
             robot, contacts, options.tasks, **options.controller
@@ -82,6 +86,7 @@ class StanceControllers:
                     torque_limits=self._options.controller.get("torque_limits"),
                     weight=_JOINT_LIMIT_WEIGHT,
                 ),
+                **self._soft_soles,
                 **self._options.controller,
             }
             contacts = self._posture.contacts.only(*stance)

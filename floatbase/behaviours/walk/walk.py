@@ -23,7 +23,7 @@ from floatbase.behaviours.terrain import Terrain
 from floatbase.behaviours.walk.active_plan import ActivePlan
 from floatbase.behaviours.walk.footholds import raibert_foothold
 from floatbase.behaviours.walk.gait import Gait
-from floatbase.behaviours.walk.gait_limits import check_friction, slow_message, speed_fractions
+from floatbase.behaviours.walk.gait_limits import check_friction, motion_message, speed_fractions
 from floatbase.behaviours.walk.lipm import CoMPlan
 from floatbase.behaviours.walk.options import (
     Gains,
@@ -67,7 +67,9 @@ class Walk:
     and plans the next footholds (`neutral_point`) and the motion of the centre of mass (`LIPM`)
     from its present position. In each control step it shifts the ends of the swings by
     `step_adjustment`, as far as the legs reach. One `WholeBodyController` for each stance does the
-    rest. If no contact forces can hold the feet, their contacts become soft.
+    rest. If no contact forces can hold the feet, their contacts become soft. Legs that cannot keep
+    a sole flat, for example without an ankle roll joint, get `contact_weight=10.0`, so that a sole
+    can roll on its edge.
 
     Between two changes of stance, a walk is a few arrays, and one compiled function writes all
     targets of a control step. With a user-defined adjustment, swings of another class than
@@ -496,8 +498,8 @@ class Walk:
         self._speeds = speed_fractions(
             self._gait, self._posture, self._options.reach, motion, self._options.acceleration[0]
         )
-        if self.speed_fraction < 1.0:
-            message = slow_message(self, self._gait, self.speed_fraction)
+        message = motion_message(self, self._gait, self._posture.state, self.speed_fraction)
+        if message:
             warnings.warn(message, SimulationWarning, stacklevel=stacklevel)
         self._refresh()
 
