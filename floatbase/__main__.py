@@ -11,7 +11,7 @@ import webbrowser
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import floatbase as fb
 
@@ -42,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     view.add_argument(
         "--feet",
-        nargs="+",
-        default=[],
+        nargs="*",
         metavar="LINK",
-        help="links of the URDF that are in contact with the ground",
+        help="links that touch the ground, with soles or balls as in their collision shapes "
+        "(default: the lowest ends of the limbs)",
     )
     view.add_argument(
         "--foot-radius",
@@ -53,6 +53,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         default=None,
         metavar="M",
         help="radius of ball feet at these links [m]",
+    )
+    view.add_argument(
+        "--posture",
+        nargs="+",
+        default=[],
+        metavar="JOINT=ANGLE",
+        help="joint positions [rad or m]; a * stands for any characters, as in '*_knee=0.6'",
+    )
+    view.add_argument(
+        "--package-dirs",
+        nargs="+",
+        default=[],
+        metavar="FOLDER",
+        help="folders of meshes named package://…",
     )
     view.add_argument(
         "--fixed", action="store_true", help="fix the root link of the URDF to the ground"
@@ -135,14 +149,34 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
+    described: dict[str, Any] = {
+        "feet": options.feet,
+        "foot_radius": options.foot_radius,
+        "posture": _posture(options.posture),
+    }
     if not options.robot.lower().endswith((".urdf", ".xml")):
-        return fb.load(options.robot)
+        return fb.load(options.robot, **described)
     return fb.load_urdf(
         options.robot,
         floating=not options.fixed,
-        feet=options.feet,
-        foot_radius=options.foot_radius,
+        package_dirs=options.package_dirs,
+        **described,
     )
+
+
+def _posture(entries: Sequence[str]) -> dict[str, float] | None:
+    """Return joint positions given as JOINT=ANGLE, or None if there are none."""
+    angles = {}
+    for entry in entries:
+        joint, _, angle = entry.rpartition("=")
+        try:
+            angles[joint] = float(angle)
+        except ValueError:
+            raise fb.FloatbaseError(
+                f"--posture has {entry!r}. Write the name of a joint and its position, as in "
+                f"'*_knee=0.6'."
+            ) from None
+    return angles or None
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:

@@ -1,6 +1,6 @@
 """Loading robots: the catalogue, other robots of example-robot-data, and your own URDFs.
 
-Robots of example-robot-data that are not in the catalogue need their feet to be given.
+The feet of robots outside the catalogue are found from the shapes of their links.
 """
 
 from __future__ import annotations
@@ -20,17 +20,22 @@ from floatbase._validation import (
     Array,
     as_bool,
     as_instance,
-    as_positive,
     as_string,
     as_strings,
     read_only,
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
-from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base
+from floatbase.robots._checks import (
+    as_posture,
+    clamp_to_limits,
+    has_floating_base,
+    with_angles,
+)
+from floatbase.robots._shapes import missing_meshes
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
+from floatbase.robots.feet import as_feet, with_bent_legs
 from floatbase.robots.robot import Foot, Robot
-from floatbase.robots.state import State
 from floatbase.robots.urdf import (
     check_urdf,
     parse_urdf,
@@ -43,10 +48,6 @@ from floatbase.robots.urdf import (
 PLATE_SIZE = (0.4, 0.03)
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
-_BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
-# ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
-# about sin θ / 5 for two equal links that are θ from straight, so this is 3°
-_MIN_SINGULAR_VALUE = 0.01
 _FLIGHT_HEIGHT = 1.0  # m: where a robot without a plate floats once its base is free
 
 
@@ -67,7 +68,7 @@ def load(
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    posture: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
     """Load a robot by name.
@@ -77,15 +78,18 @@ def load(
     name : str
         One of `catalogue()`, or any other robot of example-robot-data that has a URDF.
     feet : sequence of str or Foot, optional
-        Frames or `Foot` values that can touch the ground; by default those of the catalogue.
-        Floating-base robots outside the catalogue require them.
+        Frames or `Foot` values that can touch the ground; by default those of the catalogue, or
+        the lowest ends of the limbs of a floating-base robot outside the catalogue.
     foot_radius : float, optional
-        Radius of the feet that are given as frames [m]; 0 by default.
+        Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
+        the wheel that its collision shapes form, or a point if it has none.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the catalogue or the URDF.
-    posture : array_like, shape (nq,) or (nq - 7,), optional
+    posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. By
-        default the one that comes with the robot, with its joints brought within their limits.
+        default the one that comes with the robot, with its joints brought within their limits. A
+        mapping changes joints of that posture [rad or m]; a * in a name stands for any characters,
+        as in {"*_knee": 0.6}.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
         and τ.
@@ -106,7 +110,8 @@ def load(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture.
+        If the motors of a fixed-base robot are too weak to hold its posture, or if a robot has one
+        or two feet that are points.
 
     Examples
     --------
@@ -130,32 +135,22 @@ def load(
     start = _reference_posture(model, loader, srdf, entry)
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
-    if feet is None:
-        if foot_radius is not None:
-            raise InputError(
-                "foot_radius requires feet=[…], since the feet of the catalogue have their own "
-                "radius."
-            )
-        if name not in CATALOGUE and loader.free_flyer:
-            raise InputError(
-                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so you must give its "
-                f'feet: fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"The links at the ends of its limbs are {', '.join(_limb_ends(model))}. For a "
-                f"flying robot, use feet=[]."
-            )
     robot = _make_robot(
         name,
         urdf,
         model,
-        start if posture is None else posture,
+        _as_configuration(name, model, posture, start),
         locked,
         entry.torque_limit if torque_limits is None else torque_limits,
+        feet,
+        foot_radius,
+        entry.feet if name in CATALOGUE else None,
         package_dirs=(root.parent.parent, root),
-        feet=entry.feet if feet is None else _as_feet(feet, foot_radius),
         description=entry.description,
         sources=entry.sources,
     )
     _warn_if_motors_are_weak(robot)
+    _warn_if_feet_are_points(robot)
     return robot
 
 
@@ -165,10 +160,10 @@ def load_urdf(
     name: str | None = None,
     floating: bool = True,
     package_dirs: Sequence[str | Path] = (),
-    feet: Sequence[str | Foot] = (),
+    feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    posture: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
     """Load your own robot from a URDF.
@@ -183,16 +178,21 @@ def load_urdf(
     floating : bool, optional
         Whether the root link can move freely.
     package_dirs : sequence of str or Path, optional
-        Folders that contain meshes named package://…; the folder of the file is always searched.
+        Folders that contain meshes named package://…; the folder of the file and all folders above
+        these are always searched.
     feet : sequence of str or Foot, optional
-        Frames or `Foot` values that can touch the ground; none by default.
+        Frames or `Foot` values that can touch the ground; by default the lowest ends of the limbs,
+        or none if the base is fixed.
     foot_radius : float, optional
-        Radius of the feet that are given as frames [m]; 0 by default.
+        Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
+        the wheel that its collision shapes form, or a point if it has none.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the URDF.
-    posture : array_like, shape (nq,) or (nq - 7,), optional
-        Standing configuration of the robot before joints are locked, or its joints alone. By
-        default all joints are at zero, or at the limit nearest to zero.
+    posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
+        Standing configuration of the robot before joints are locked, or its joints alone. A mapping
+        holds some joints [rad or m]; a * in a name stands for any characters, as in {"*_knee":
+        0.6}, and later entries take precedence. Other joints are at zero, or at the limit nearest
+        to zero. By default all joints are, except that legs which would be straight are bent.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
@@ -212,8 +212,9 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors of a fixed-base robot are too weak to hold its posture, or if no posture is
-        given and a leg of a floating-base robot is straight or otherwise singular.
+        If the motors of a fixed-base robot are too weak to hold its posture, if mesh files are
+        missing, if a robot has one or two feet that are points, or if no posture is given and a leg
+        of a floating-base robot remains straight or otherwise singular.
     """
     urdf = as_string("path", str(path) if isinstance(path, Path) else path)
     directories = _as_directories(package_dirs)
@@ -234,20 +235,24 @@ def load_urdf(
                 )
         urdf, directories = read_urdf(file), (*directories, file.resolve().parent)
     model = parse_urdf(name, urdf, floating)
-    start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
+    start = clamp_to_limits(model, pin.neutral(model))
     robot = _make_robot(
         name,
         urdf,
         model,
-        start,
+        _as_configuration(name, model, posture, start),
         locked,
         torque_limits,
+        feet,
+        foot_radius,
         package_dirs=directories,
-        feet=_as_feet(feet, foot_radius),
     )
-    _warn_if_motors_are_weak(robot)
     if posture is None:
-        _warn_if_legs_are_singular(robot)
+        robot = with_bent_legs(robot)
+    if directories:
+        _warn_if_meshes_are_missing(robot)
+    _warn_if_motors_are_weak(robot)
+    _warn_if_feet_are_points(robot)
     return robot
 
 
@@ -296,6 +301,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
         name=robot.name,
         package_dirs=robot.package_dirs,
         torque_limits=robot.torque_limits,
+        feet=(),
     )
     width, thickness = PLATE_SIZE
     corners = np.array(
@@ -320,6 +326,11 @@ def _make_robot(
     posture: npt.ArrayLike,
     locked: Sequence[str],
     torque_limits: npt.ArrayLike | None,
+    feet: Sequence[str | Foot] | None,
+    foot_radius: float | None,
+    known_feet: tuple[Foot, ...] | None = None,
+    *,
+    package_dirs: tuple[Path, ...],
     **fields: Any,
 ) -> Robot:
     """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
@@ -345,7 +356,9 @@ def _make_robot(
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
-    return Robot(name, model, urdf, posture=posture, torque_limits=torque_limits, **fields)  # type: ignore[arg-type]  # it checks
+    posture = as_posture(name, model, posture)
+    feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
 
 
 def _warn_if_motors_are_weak(robot: Robot) -> None:
@@ -375,32 +388,33 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
-def _warn_if_legs_are_singular(robot: Robot) -> None:
-    """Warn if a foot of a floating-base robot moves in fewer directions than with a bent leg.
+def _warn_if_feet_are_points(robot: Robot) -> None:
+    """Warn if a floating-base robot has too few points of contact to stand on them.
 
     The warning points at the code that called the loading function.
     """
-    if not robot.is_floating:
-        return
-    bend = np.r_[np.zeros(6), np.full(robot.d, _BEND)]
-    posture = np.array(robot.posture)
-    present, bent = (State(robot, q) for q in (posture, pin.integrate(robot.model, posture, bend)))
-    singular = []
-    for foot in robot.feet:
-        rows = 6 if foot.is_flat else 3
-        values, bent_values = (
-            np.linalg.svd(state.frame_jacobian(foot.frame)[:rows, 6:], compute_uv=False)
-            for state in (present, bent)
-        )
-        rank = int((bent_values > _MIN_SINGULAR_VALUE * bent_values[:1].sum()).sum())
-        if (values[:rank] < _MIN_SINGULAR_VALUE * values[:1].sum()).any():
-            singular.append(foot.frame)
-    if singular:
+    if robot.is_floating and 1 <= len(robot.feet) <= 2 and not any(f.is_flat for f in robot.feet):
+        names = [foot.frame for foot in robot.feet]
         message = (
-            f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
-            f"The legs of {', '.join(singular)} are then singular, for example straight, and "
-            f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
-            f"load_urdf: {robot.d} joint positions."
+            f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
+            f"point(s) only: {', '.join(names)}. If it has soles, give their corners, as in "
+            f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+        )
+        warnings.warn(message, RobotWarning, stacklevel=3)
+
+
+def _warn_if_meshes_are_missing(robot: Robot) -> None:
+    """Warn if mesh files do not exist.
+
+    The warning points at the code that called the loading function.
+    """
+    missing = missing_meshes(robot.urdf, robot.package_dirs)
+    if missing:
+        more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+        message = (
+            f"The mesh file {missing[0]}{more} of {robot.name} does not exist. Links without their "
+            f"meshes are represented by other shapes or a box. Give the folder that contains the "
+            f"meshes or their package, as in package_dirs=[…]."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 
@@ -474,27 +488,13 @@ def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Arra
     return clamp_to_limits(model, q)
 
 
-def _limb_ends(model: pin.Model) -> list[str]:
-    """Return the names of the links at the ends of limbs: feet, fingers, heads.
-
-    These links are behind the last joint of a limb and carry no other link.
-    """
-    frames, parent_joints = model.frames, set(model.parents)
-    bodies = [frame for frame in frames if frame.type == pin.FrameType.BODY]
-    # the parent of a link is the frame of a joint
-    parents = {frames[frames[frame.parentFrame].parentFrame].name for frame in bodies}
-    return [
-        str(frame.name)
-        for frame in bodies
-        if frame.name not in parents and frame.parentJoint not in parent_joints
-    ]
-
-
-def _as_feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
-    """Return feet, given as frames or `Foot` values, as `Foot` values."""
-    if isinstance(requested, str) or not isinstance(requested, Sequence):
-        raise InputError(
-            f'feet must be a list of frames, as in feet=["FL_foot"], not {short_repr(requested)}.'
-        )
-    r = 0.0 if radius is None else as_positive("foot_radius", radius, "m", allow_zero=True)
-    return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in requested)
+def _as_configuration(
+    name: str,
+    model: pin.Model,
+    posture: npt.ArrayLike | Mapping[str, float] | None,
+    start: Array,
+) -> npt.ArrayLike:
+    """Return the posture that was requested: a configuration, or `start` with other angles."""
+    if posture is None:
+        return start
+    return with_angles(name, model, start, posture) if isinstance(posture, Mapping) else posture

@@ -254,10 +254,9 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
             f"The foot {foot.frame} is not a link of the URDF. Give feet by the names of their "
             f"links."
         )
-    if foot.corners is None:
-        centres, radius = foot.centre[None], max(foot.radius, _MIN_BALL_RADIUS)
-    else:
-        centres, radius = foot.corners + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
+    centres, radius = foot.points, max(foot.radius, _MIN_BALL_RADIUS)
+    if foot.is_flat:
+        centres, radius = centres + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
         body.add_geom(
             name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1

@@ -181,7 +181,7 @@ class Gait(Value):
                 f"{robot.name} has {len(names)} feet, but Gait.walk needs two or four. Make its "
                 f"gait with Gait(offsets, …)."
             )
-        flat = any(foot.corners is not None for foot in robot.feet)
+        flat = any(foot.is_flat for foot in robot.feet)
         values: tuple[float, float, float] = (0.25, 0.0, 1.0)
         if len(names) == 2:
             values = (0.6, 0.1, 1.0) if flat else (0.15, 0.0, 0.0)
