@@ -20,7 +20,7 @@ from floatbase.robots._shapes import link_shapes, shape_points
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
-_LEVEL = 0.05  # of the base's height: by how much the ends of legs may differ in height
+_LEVEL = 0.05  # of the robot's height: by how much the ends of legs may differ in height
 # with fewer joints, a leg cannot choose both the position of its sole and the way the sole faces
 _SOLE_JOINTS = 5
 _MIN_UPRIGHT = 0.9  # vertical component of the z axis of a frame in which a sole can be given
@@ -31,7 +31,7 @@ _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_CROUCH = 0.05  # of the base's height: by how much bent legs are shorter than straight ones
+_CROUCH = 0.05  # of a leg's height: by how much bent legs are shorter than straight ones
 _KICK = 0.3  # rad or m: first change of the joints of a straight leg, which shows how it bends
 _NEARNESS = 1e-3  # weight of the joints' distance from the given posture: m per rad
 _MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull of `_NEARNESS`
@@ -144,9 +144,8 @@ def _find_feet(model: pin.Model, urdf: str, folders: Sequence[Path], q: Array) -
         ]
         if heights:
             lowest[joint] = min(heights)
-    base_height = float(data.oMi[1].translation[2]) if ends else 0.0
-    ground = min((height for height, _ in lowest.values()), default=base_height)
-    tolerance = _LEVEL * (base_height - ground)
+    ground = min((height for height, _ in lowest.values()), default=0.0)
+    tolerance = _LEVEL * (max(placement.translation[2] for placement in data.oMi) - ground)
     feet = [
         _make_foot(model, data, shapes, [link, *_links_of(model, joint)])
         for joint, (height, link) in lowest.items()
@@ -189,11 +188,12 @@ def _bent_posture(robot: Robot) -> Array | None:
         v[columns] = x
         return np.asarray(pin.integrate(model, start, v))
 
-    straight = np.concatenate([start[:7], pin.neutral(model)[7:]])
-    targets = []
-    for (place, _), (now, _) in zip(feet(straight), feet(start), strict=True):
-        place[2] = max(place[2] + _CROUCH * (start[2] - place[2]), now[2])
-        targets.append(place)
+    now, straight = feet(start), feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
+    top = max(data.oMi[i].translation[2] for i in legs)
+    targets = [
+        np.array([x, y, max(z + _CROUCH * (top - z), present[2])])
+        for ((x, y, z), _), (present, _) in zip(straight, now, strict=True)
+    ]
 
     def errors(x: Array) -> Array:
         rows = [

@@ -299,7 +299,6 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     floating = load_urdf(
         without_world_link(robot.urdf),
         name=robot.name,
-        package_dirs=robot.package_dirs,
         torque_limits=robot.torque_limits,
         feet=(),
     )
@@ -312,6 +311,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     )
     return replace(
         floating,
+        package_dirs=robot.package_dirs,
         feet=(Foot(floating.base, corners=corners),) if plate else (),
         posture=read_only(
             [0.0, 0.0, thickness if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]

@@ -3,7 +3,6 @@ cannot be used.
 """
 
 import pickle
-import warnings
 from pathlib import Path
 
 import example_robot_data
@@ -217,18 +216,3 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path):
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
     refused(lambda: fb.load_urdf(broken), InputError, "broken", "URDF")
-
-
-@pytest.mark.parametrize("name", ["solo12", "talos", "go2"])
-def test_straight_legs_are_reported_if_no_posture_is_given(name):
-    robot = judges.load(name)
-    feet = list(robot.feet)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        fb.load_urdf(robot.urdf, feet=feet, posture=robot.posture)
-        fb.load_urdf(robot.urdf)  # no feet, so no legs
-        if name == "go2":  # its limits keep the knees bent
-            fb.load_urdf(robot.urdf, feet=feet)
-            return
-    with warns(RobotWarning, "posture", feet[0].frame, robot.d):
-        fb.load_urdf(robot.urdf, feet=feet)
