@@ -255,8 +255,8 @@ def _points(placement: pin.SE3, shape: Any) -> Array:
 def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Sequence[str]) -> Foot:
     """Return the wheel, sole or ball that the first of some links is.
 
-    The z axis of a sole's frame points up. One of the other links, which the same joint moves, may
-    have such a frame.
+    The z axis of a sole's frame points up while joints are at zero. One of the other links, which
+    the same joint moves, may have such a frame.
     """
     frame = model.frames[model.getFrameId(links[0], pin.BODY)]
     joint, n_joints = frame.parentJoint, len(model.supports[frame.parentJoint]) - 2
@@ -264,14 +264,16 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
     own = [shape for shape in on_joint if _link_of(model, shape) == links[0]] or on_joint
     if not own or n_joints < 1:
         return Foot(links[0])
+    straight = model.createData()
+    pin.framesForwardKinematics(model, straight, clamp_to_limits(model, pin.neutral(model)))
     foot = _wheel(model, frame, own) if model.nqs[joint] == 2 else None
     if foot is not None:
         return foot
     world = data.oMi[joint]
     for link in links if n_joints >= _SOLE_JOINTS else ():
-        placement = data.oMf[model.getFrameId(link, pin.BODY)]
-        if placement.rotation[2, 2] > _MIN_UPRIGHT:
-            corners = _sole(placement.inverse() * world, own)
+        link_frame = model.getFrameId(link, pin.BODY)
+        if straight.oMf[link_frame].rotation[2, 2] > _MIN_UPRIGHT:
+            corners = _sole(model.frames[link_frame].placement.inverse(), own)
             if corners is not None:
                 return Foot(link, corners=corners)
     lowest = min(own, key=lambda shape: float(_points(world, shape)[:, 2].min()))

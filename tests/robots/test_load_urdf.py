@@ -130,7 +130,7 @@ def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice():
 def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(fb.load("ur5").urdf, encoding="utf-8")
-    arm = fb.load_urdf(file, floating=False)
+    arm = fb.load_urdf(file, floating=False, package_dirs=fb.load("ur5").package_dirs)
     file.write_text("<robot/>")
     state = pickle.loads(pickle.dumps(with_floating_base(arm))).random_state(0)
     assert judges.relative(state.M, judges.Mujoco(state.robot).move_to(state).M) < 1e-9
