@@ -85,11 +85,15 @@ def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
     return q
 
 
-def with_angles(name: str, model: pin.Model, q: Array, angles: Mapping[str, float]) -> Array:
-    """Return a configuration with other positions of some joints [rad or m].
+def with_angles(
+    name: str, model: pin.Model, q: Array, angles: npt.ArrayLike | Mapping[str, float] | None
+) -> npt.ArrayLike:
+    """Return a configuration with other positions of some joints [rad or m], or the one given.
 
     A * in the name of a joint stands for any characters. Later entries take precedence.
     """
+    if not isinstance(angles, Mapping):
+        return q if angles is None else angles
     changed, joints = np.array(q), list(model.names)[2 if has_floating_base(model) else 1 :]
     for pattern, angle in angles.items():
         matching = [j for j in joints if j == pattern or fnmatchcase(j, str(pattern))]

@@ -139,7 +139,7 @@ def load(
         name,
         urdf,
         model,
-        _as_configuration(name, model, posture, start),
+        with_angles(name, model, start, posture),
         locked,
         entry.torque_limit if torque_limits is None else torque_limits,
         feet,
@@ -150,7 +150,7 @@ def load(
         sources=entry.sources,
     )
     _warn_if_motors_are_weak(robot)
-    _warn_if_feet_are_points(robot)
+    _warn_if_feet_are_points(robot, feet)
     return robot
 
 
@@ -240,7 +240,7 @@ def load_urdf(
         name,
         urdf,
         model,
-        _as_configuration(name, model, posture, start),
+        with_angles(name, model, start, posture),
         locked,
         torque_limits,
         feet,
@@ -252,7 +252,7 @@ def load_urdf(
     if directories:
         _warn_if_meshes_are_missing(robot)
     _warn_if_motors_are_weak(robot)
-    _warn_if_feet_are_points(robot)
+    _warn_if_feet_are_points(robot, feet)
     return robot
 
 
@@ -388,12 +388,16 @@ def _warn_if_motors_are_weak(robot: Robot) -> None:
         warnings.warn(message, RobotWarning, stacklevel=3)
 
 
-def _warn_if_feet_are_points(robot: Robot) -> None:
-    """Warn if a floating-base robot has too few points of contact to stand on them.
+def _warn_if_feet_are_points(robot: Robot, requested: Sequence[str | Foot] | None) -> None:
+    """Warn if a robot has too few points of contact to stand on, unless they were given as `Foot`.
 
     The warning points at the code that called the loading function.
     """
-    if robot.is_floating and 1 <= len(robot.feet) <= 2 and not any(f.is_flat for f in robot.feet):
+    if (
+        robot.is_floating
+        and 1 <= len(robot.feet) <= 2
+        and not any(foot.is_flat or foot in (requested or ()) for foot in robot.feet)
+    ):
         names = [foot.frame for foot in robot.feet]
         message = (
             f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
@@ -486,15 +490,3 @@ def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Arra
     if loader.free_flyer:
         q[:7] = pin.SE3ToXYZQUAT(loaded.model.jointPlacements[1] * pin.XYZQUATToSE3(q[:7]))
     return clamp_to_limits(model, q)
-
-
-def _as_configuration(
-    name: str,
-    model: pin.Model,
-    posture: npt.ArrayLike | Mapping[str, float] | None,
-    start: Array,
-) -> npt.ArrayLike:
-    """Return the posture that was requested: a configuration, or `start` with other angles."""
-    if posture is None:
-        return start
-    return with_angles(name, model, start, posture) if isinstance(posture, Mapping) else posture
