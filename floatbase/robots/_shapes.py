@@ -109,8 +109,9 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
     path = _find_mesh(mesh.get("filename", ""), folders)
     if path is None:
         return False
-    scale = _unit(path) * np.array([float(x) for x in mesh.get("scale", "1 1 1").split()])
     try:
+        factors = [float(x) for x in mesh.get("scale", "1 1 1").split()]
+        scale = _unit(path) * np.broadcast_to(factors, (3,))
         loader.load(str(path), scale)
     except (RuntimeError, ValueError) as error:
         warnings.warn(

@@ -172,6 +172,8 @@ def _bent_posture(robot: Robot) -> Array | None:
     model, data, start = robot.model, robot.model.createData(), np.array(robot.posture)
     frames = [robot.frame_id(foot.frame) for foot in robot.feet]
     legs = sorted({i for f in frames for i in model.supports[model.frames[f].parentJoint]} - {0, 1})
+    if not legs:  # the feet belong to the base
+        return None
     columns = np.array([model.idx_vs[i] for i in legs])
 
     def feet(q: Array) -> list[tuple[Array, Array]]:
@@ -297,7 +299,7 @@ def _wheel(model: pin.Model, frame: pin.Frame, shapes: list[Any]) -> Foot | None
 
 
 def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
-    """Return four corners of the lowest part of shapes, or None if it is small compared to them.
+    """Return up to four corners of the lowest part of shapes, or None if that part is small.
 
     `placement` is that of the joint in the frame of the sole.
     """
@@ -315,7 +317,8 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
         return None
     # the corners farthest to the front left, front right, rear right and rear left
     farthest = [int(np.argmax(sole[:, :2] @ (sign / size))) for sign in _DIAGONALS]
-    if len(set(farthest)) < len(farthest):
+    farthest = list(dict.fromkeys(farthest))
+    if len(farthest) < 3:
         return None
     corners = np.column_stack([sole[farthest, :2], np.full(len(farthest), bottom)])
     return np.asarray(corners.round(_DIGITS))

@@ -416,9 +416,9 @@ def _warn_if_meshes_are_missing(robot: Robot) -> None:
     if missing:
         more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
         message = (
-            f"The mesh file {missing[0]}{more} of {robot.name} does not exist. Links without their "
-            f"meshes are represented by other shapes or a box. Give the folder that contains the "
-            f"meshes or their package, as in package_dirs=[…]."
+            f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Its link is "
+            f"represented by other shapes or a box. Give the folder that contains the meshes or "
+            f"their package, as in package_dirs=[…]."
         )
         warnings.warn(message, RobotWarning, stacklevel=3)
 

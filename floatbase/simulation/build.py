@@ -10,6 +10,7 @@ import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -58,7 +59,7 @@ def build_model(robot: Robot, ground: Ground, timestep: float) -> mujoco.MjModel
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
     """
-    model = copy.copy(_compiled_model(robot, _ground_data(ground), timestep))
+    model = copy.copy(_compiled_model(robot, robot.package_dirs, _ground_data(ground), timestep))
     if model.nv != robot.nv:
         raise SimulationError(
             f"MuJoCo finds {model.nv} degrees of freedom in the URDF of {robot.name}, but the "
@@ -90,8 +91,13 @@ def _ground_data(ground: Ground) -> _GroundData:
 
 
 @lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
-def _compiled_model(robot: Robot, ground: _GroundData, timestep: float) -> mujoco.MjModel:
-    """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it."""
+def _compiled_model(
+    robot: Robot, folders: tuple[Path, ...], ground: _GroundData, timestep: float
+) -> mujoco.MjModel:
+    """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it.
+
+    Equal robots with meshes in other folders can have other hulls.
+    """
     try:
         return _build_spec(robot, ground, timestep).compile()
     except ValueError as error:
@@ -266,7 +272,7 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
     """Add the massless hulls of links; they stop at once on impact and leave the ground slowly."""
     impact_time = max(_IMPACT_TIME, 4.0 * spec.option.timestep)
-    for joint_id, points in link_hulls(robot):
+    for joint_id, points in link_hulls(robot, robot.package_dirs):
         joint = spec.joint(robot.model.names[joint_id])  # None for the free joint: its name differs
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
         mesh = spec.add_mesh(name=f"hull of {body.name}", uservert=points.ravel())

@@ -6,6 +6,7 @@ After a fall, the robot lies on them.
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +19,7 @@ _BLOCK_SIZE = 1024  # points at a time: as many as one core's cache holds
 
 
 @lru_cache(maxsize=16)
-def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
+def link_hulls(robot: Robot, folders: tuple[Path, ...]) -> tuple[tuple[int, Array], ...]:
     """Return the joints that move links, each with the points that span its links' hull.
 
     All links that one joint moves share one hull, because a plane touches a body exactly where it
@@ -27,7 +28,7 @@ def link_hulls(robot: Robot) -> tuple[tuple[int, Array], ...]:
     if not robot.is_floating:
         return ()
     clouds = dict[int, list[Array]]()
-    for item in link_shapes(robot.model, robot.urdf, robot.package_dirs)[0]:
+    for item in link_shapes(robot.model, robot.urdf, folders)[0]:
         points = (
             shape_points(item.geometry) @ item.placement.rotation.T + item.placement.translation
         )
