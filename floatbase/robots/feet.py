@@ -11,7 +11,6 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import least_squares
 
 from floatbase._validation import Array, as_positive, short_repr
 from floatbase.errors import InputError, RobotWarning
@@ -169,6 +168,8 @@ def _bent_posture(robot: Robot) -> Array | None:
 
     The feet are above their places at joint positions of zero, and soles are level.
     """
+    from scipy.optimize import least_squares  # slow to import, and rarely needed
+
     model, data, start = robot.model, robot.model.createData(), np.array(robot.posture)
     frames = [robot.frame_id(foot.frame) for foot in robot.feet]
     legs = sorted({i for f in frames for i in model.supports[model.frames[f].parentJoint]} - {0, 1})
