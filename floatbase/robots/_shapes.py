@@ -7,7 +7,6 @@ import os
 import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +132,6 @@ def _reason(error: Exception) -> str:
     return (lines or str(error).splitlines() or ["unknown reason"])[-1].rstrip(".")
 
 
-@lru_cache(maxsize=1024)
 def _unit(path: Path) -> float:
     """Return the unit of length of a Collada file [m]; 1 for other files, which have none."""
     if path.suffix.lower() == ".dae":
