@@ -19,6 +19,7 @@ from harness import tilt, velocity
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Stand, Walk
+from floatbase.robots import Foot
 from floatbase.simulation import Rollout
 
 SEED = 0
@@ -229,7 +230,7 @@ def gait_walked(name: str, gait: str, mu: float) -> Row:
 
 
 def bolt_walked() -> Row:
-    robot = fb.load("bolt", feet=["FL_FOOT", "FR_FOOT"])
+    robot = fb.load("bolt", feet=[Foot("FL_FOOT"), Foot("FR_FOOT")])
     walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot))
     run = fb.rollout(fb.Simulation(robot), walk, 4.0, control_period=2e-3)
     drift = most("{:.0f} mm", 1e3 * np.linalg.norm(run.com[-1, :2]), 200.0)

@@ -11,7 +11,7 @@ import webbrowser
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import floatbase as fb
 from floatbase.robots import file_loader
@@ -45,10 +45,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     view.add_argument(
         "--feet",
-        nargs="+",
-        default=[],
+        nargs="*",
         metavar="LINK",
-        help="links of the file that are in contact with the ground",
+        help="links of the file that touch the ground, with soles or balls as in their collision "
+        "shapes (default: the lowest ends of the limbs)",
     )
     view.add_argument(
         "--foot-radius",
@@ -56,6 +56,21 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         metavar="M",
         help="radius of ball feet at these links [m]",
+    )
+    view.add_argument(
+        "--posture",
+        nargs="+",
+        default=[],
+        metavar="JOINT=ANGLE",
+        help="joint positions [rad or m]; a * stands for any characters, as in '*_knee=0.6'; or "
+        "the name of a keyframe in an MJCF",
+    )
+    view.add_argument(
+        "--package-dirs",
+        nargs="+",
+        default=[],
+        metavar="FOLDER",
+        help="folders of a URDF's meshes named package://…",
     )
     view.add_argument(
         "--fixed", action="store_true", help="fix the root link of the file to the ground"
@@ -158,11 +173,34 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
+    described: dict[str, Any] = {
+        "feet": options.feet,
+        "foot_radius": options.foot_radius,
+        "posture": _posture(options.posture),
+    }
     load_file = file_loader(options.robot)
     if load_file is None:
-        return fb.load(options.robot)
-    fixed = {"floating": False} if options.fixed else {}
-    return load_file(options.robot, feet=options.feet, foot_radius=options.foot_radius, **fixed)
+        return fb.load(options.robot, **described)
+    if options.fixed:
+        described["floating"] = False
+    if options.package_dirs:
+        described["package_dirs"] = options.package_dirs
+    return load_file(options.robot, **described)
+
+
+def _posture(entries: Sequence[str]) -> dict[str, float] | None:
+    """Return joint positions given as JOINT=ANGLE, or None if there are none."""
+    angles = {}
+    for entry in entries:
+        joint, _, angle = entry.rpartition("=")
+        try:
+            angles[joint] = float(angle)
+        except ValueError:
+            raise fb.FloatbaseError(
+                f"--posture has {entry!r}. Write the name of a joint and its position, as in "
+                f"'*_knee=0.6'."
+            ) from None
+    return angles or None
 
 
 def _restart_message(given: Sequence[str], requested_port: int, port: int) -> str:

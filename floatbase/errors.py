@@ -5,6 +5,8 @@ Each message says what is wrong, what is expected, and what to do.
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Iterable
 from contextlib import suppress
 from difflib import get_close_matches
@@ -106,6 +108,14 @@ def require(module: str, extra: str) -> ModuleType:
             f"{module} is not installed. Install it with the extra {extra!r}: "
             f"pip install 'floatbase[{extra}]'."
         ) from None
+
+
+def warn(message: str, category: type[Warning]) -> None:
+    """Issue a warning that points at the code that called the package."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("floatbase."):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def short_repr(value: object) -> str:

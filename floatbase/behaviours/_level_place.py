@@ -47,7 +47,7 @@ def _search_grid(reach: float) -> Array:
 
 def foot_outline(foot: Foot, yaw: float) -> Array:
     """Return points around the middle of a foot that must not be beyond an edge, (n, 2) [m]."""
-    if foot.corners is None:
+    if not foot.is_flat:
         return (2.0 * foot.radius + _EDGE_MARGIN) * _CIRCLE
     c, s = cos(yaw), sin(yaw)
-    return np.asarray(_SOLE_MARGIN * foot.corners[:, :2] @ np.array([[c, s], [-s, c]]))
+    return np.asarray(_SOLE_MARGIN * foot.points[:, :2] @ np.array([[c, s], [-s, c]]))

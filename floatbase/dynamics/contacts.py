@@ -524,8 +524,8 @@ def constraint_and_jacobian(
 
 def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
     """Make the contact of a foot: a point if it has no corners or `flat` is False."""
-    if flat and foot.corners is not None:
-        return FlatFootContact(foot.frame, foot.corners, normal, mu)
+    if flat and foot.is_flat:
+        return FlatFootContact(foot.frame, foot.points, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
 
 

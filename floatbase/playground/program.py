@@ -185,8 +185,7 @@ def _load_call(robot: Robot) -> str:
             return f"fb.load({robot.name!r})"
     given = [repr(f"{robot.name}.urdf"), *([] if robot.is_floating else ["floating=False"])]
     if robot.feet:
-        given += [
-            f"feet={[foot.frame for foot in robot.feet]}",
-            f"foot_radius={robot.feet[0].radius!r}",
-        ]
+        given.append(f"feet={[foot.frame for foot in robot.feet]}")
+        if not robot.feet[0].is_flat:  # soles are found in the URDF
+            given.append(f"foot_radius={robot.feet[0].radius!r}")
     return f"fb.load_urdf({', '.join(given)})"

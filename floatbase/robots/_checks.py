@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array, as_array, numeric_copy, read_only, short_repr
-from floatbase.errors import InputError
+from floatbase.errors import InputError, unknown_name
 
 # accepts quaternions printed with seven digits; normalizing a larger error could hide a fault
 UNIT_NORM_TOLERANCE = 1e-6
@@ -80,6 +83,30 @@ def as_posture(name: str, model: pin.Model, posture: npt.ArrayLike) -> Array:
                 f"lie between its limits {minimum:.6g} and {maximum:.6g} [rad or m]."
             )
     return q
+
+
+def with_angles(
+    name: str, model: pin.Model, q: Array, angles: npt.ArrayLike | Mapping[str, float] | None
+) -> npt.ArrayLike:
+    """Return a configuration with other positions of some joints [rad or m], or the one given.
+
+    A * in the name of a joint stands for any characters. Later entries take precedence.
+    """
+    if not isinstance(angles, Mapping):
+        return q if angles is None else angles
+    changed, joints = np.array(q), list(model.names)[2 if has_floating_base(model) else 1 :]
+    for pattern, angle in angles.items():
+        matching = [j for j in joints if j == pattern or fnmatchcase(j, str(pattern))]
+        if not matching:
+            raise unknown_name(
+                f"joint of {name}", pattern, joints, "A * stands for any characters."
+            )
+        x = float(as_array(f"posture[{pattern!r}]", angle, (), "rad or m"))
+        for joint in map(model.getJointId, matching):
+            # a joint without limits has the entries (cos, sin)
+            entries = [np.cos(x), np.sin(x)] if model.nqs[joint] == 2 else x
+            changed[model.idx_qs[joint] :][: model.nqs[joint]] = entries
+    return changed
 
 
 def check_unit_norms(

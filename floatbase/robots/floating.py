@@ -49,8 +49,8 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     floating = load_urdf(
         robot.urdf,
         name=robot.name,
-        package_dirs=robot.package_dirs,
         torque_limits=robot.torque_limits,
+        feet=(),
     )
     model = floating.model.copy()
     model.armature = np.concatenate([np.zeros(6), robot.model.armature])  # not in the URDF
@@ -64,6 +64,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     return replace(
         floating,
         model=model,
+        package_dirs=robot.package_dirs,
         feet=(Foot(floating.base, corners=corners),) if plate else (),
         posture=read_only(
             [0.0, 0.0, thickness if plate else _FLIGHT_HEIGHT, 0.0, 0.0, 0.0, 1.0, *robot.posture]

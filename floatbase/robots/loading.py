@@ -1,12 +1,11 @@
 """Loading robots: the catalogue, other robots of example-robot-data, your own URDFs and MJCFs.
 
-Robots of example-robot-data that are not in the catalogue need their feet to be given.
+The feet of robots outside the catalogue are found from the shapes of their links.
 """
 
 from __future__ import annotations
 
 import os
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -19,17 +18,26 @@ import pinocchio as pin
 from floatbase._validation import (
     Array,
     as_bool,
-    as_positive,
     as_string,
     as_strings,
     short_repr,
 )
-from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name
-from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base
+from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
+from floatbase.robots._checks import (
+    as_posture,
+    clamp_to_limits,
+    has_floating_base,
+    with_angles,
+)
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
-from floatbase.robots.plausibility import warn_if_it_cannot_stand
+from floatbase.robots.feet import as_feet, with_bent_legs
+from floatbase.robots.plausibility import (
+    missing_meshes_message,
+    passive_joints_message,
+    problems,
+    straight_legs_message,
+)
 from floatbase.robots.robot import Foot, Robot
-from floatbase.robots.state import State
 from floatbase.robots.urdf import (
     check_couplings,
     check_model,
@@ -42,10 +50,6 @@ from floatbase.robots.urdf import (
 _FILE_ENDINGS = (".urdf", ".xml", ".mjcf")
 # characters that may precede a URDF text: an XML declaration must be at the very beginning
 _WHITESPACE = "\ufeff \t\r\n"
-_BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
-# ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
-# about sin θ / 5 for two equal links that are θ from straight, so this is 3°
-_MIN_SINGULAR_VALUE = 0.01
 
 
 def catalogue() -> dict[str, str]:
@@ -65,7 +69,7 @@ def load(
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    posture: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
     """Load a robot by name.
@@ -76,15 +80,18 @@ def load(
         One of `catalogue()`, any other robot of example-robot-data that has a URDF, or the path of
         a file, which `load_urdf` or `load_mjcf` loads.
     feet : sequence of str or Foot, optional
-        Frames or `Foot` values that can touch the ground; by default those of the catalogue.
-        Floating-base robots outside the catalogue require them.
+        Frames or `Foot` values that can touch the ground; by default those of the catalogue, or
+        the lowest ends of the limbs of a floating-base robot outside the catalogue.
     foot_radius : float, optional
-        Radius of the feet that are given as frames [m]; 0 by default.
+        Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
+        the wheel that its collision shapes form, or a point if it has none.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the catalogue or the URDF.
-    posture : array_like, shape (nq,) or (nq - 7,), optional
+    posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. By
-        default the one that comes with the robot, with its joints brought within their limits.
+        default the one that comes with the robot, with its joints brought within their limits. A
+        mapping changes joints of that posture [rad or m]; a * in a name stands for any characters,
+        as in {"*_knee": 0.6}.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
         and τ.
@@ -105,8 +112,9 @@ def load(
     Warns
     -----
     RobotWarning
-        If the motors are too weak to hold the robot in its posture or on its feet, or if the robot
-        is upside down.
+        If the robot probably cannot stand: legs that remain straight without a posture, one or two
+        feet that are points, motors that are too weak, a base that is upside down, or lengths that
+        are not in metres.
 
     Examples
     --------
@@ -120,7 +128,7 @@ def load(
     if load_file is not None:
         return load_file(
             name,
-            feet=feet or (),
+            feet=feet,
             foot_radius=foot_radius,
             torque_limits=torque_limits,
             posture=posture,
@@ -141,34 +149,21 @@ def load(
     start = _reference_posture(model, loader, srdf, entry)
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
-    if feet is None:
-        if foot_radius is not None:
-            raise InputError(
-                "foot_radius requires feet=[…], since the feet of the catalogue have their own "
-                "radius."
-            )
-        if name not in CATALOGUE and loader.free_flyer:
-            raise InputError(
-                f"{name} is not in the catalogue ({', '.join(CATALOGUE)}), so you must give its "
-                f'feet: fb.load("{name}", feet=["name of a foot frame", …], foot_radius=0.02). '
-                f"The links at the ends of its limbs are {', '.join(_limb_ends(model))}. For a "
-                f"flying robot, use feet=[]."
-            )
     robot = _make_robot(
         name,
         urdf,
         model,
-        start if posture is None else posture,
+        with_angles(name, model, start, posture),
         locked,
         entry.torque_limit if torque_limits is None else torque_limits,
+        feet,
+        foot_radius,
+        entry.feet if name in CATALOGUE else None,
         package_dirs=(root.parent.parent, root),
-        feet=entry.feet if feet is None else _as_feet(feet, foot_radius),
         description=entry.description,
         sources=entry.sources,
     )
-    _warn_if_motors_are_weak(robot)
-    warn_if_it_cannot_stand(robot)
-    return robot
+    return _checked(robot, feet)
 
 
 def file_loader(path: str) -> Callable[..., Robot] | None:
@@ -200,10 +195,10 @@ def load_urdf(
     name: str | None = None,
     floating: bool = True,
     package_dirs: Sequence[str | Path] = (),
-    feet: Sequence[str | Foot] = (),
+    feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    posture: npt.ArrayLike | None = None,
+    posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
     """Load your own robot from a URDF.
@@ -219,16 +214,21 @@ def load_urdf(
         Whether the base can move freely. The base is then the first link with mass: links without
         mass below it, such as "world", are removed, together with a floating joint.
     package_dirs : sequence of str or Path, optional
-        Folders that contain meshes named package://…; the folder of the file is always searched.
+        Folders that contain meshes named package://…; the folder of the file and all folders above
+        these are always searched.
     feet : sequence of str or Foot, optional
-        Frames or `Foot` values that can touch the ground; none by default.
+        Frames or `Foot` values that can touch the ground; by default the lowest ends of the limbs,
+        or none if the base is fixed.
     foot_radius : float, optional
-        Radius of the feet that are given as frames [m]; 0 by default.
+        Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
+        the wheel that its collision shapes form, or a point if it has none.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default those of the URDF.
-    posture : array_like, shape (nq,) or (nq - 7,), optional
-        Standing configuration of the robot before joints are locked, or its joints alone. By
-        default all joints are at zero, or at the limit nearest to zero.
+    posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
+        Standing configuration of the robot before joints are locked, or its joints alone. A mapping
+        holds some joints [rad or m]; a * in a name stands for any characters, as in {"*_knee":
+        0.6}, and later entries take precedence. Other joints are at zero, or at the limit nearest
+        to zero. By default all joints are, except that legs which would be straight are bent.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
@@ -248,10 +248,10 @@ def load_urdf(
     Warns
     -----
     RobotWarning
-        If the motors are too weak to hold the robot in its posture or on its feet, if the robot is
-        upside down, if its lengths are probably not in metres, if no posture is given and a leg of
-        a floating-base robot is straight or otherwise singular, if only some joints have a torque
-        limit, or if the URDF has settings for MuJoCo, which are ignored.
+        If the robot probably cannot stand: legs that remain straight without a posture, one or two
+        feet that are points, motors that are too weak, a base that is upside down, or lengths that
+        are not in metres. Also if mesh files are missing, if only some joints have a torque limit,
+        or if the URDF has settings for MuJoCo, which are ignored.
 
     Notes
     -----
@@ -278,24 +278,23 @@ def load_urdf(
         urdf, directories = read_text(file), (*directories, file.resolve().parent)
     urdf = normalize_urdf(name, urdf, floating)
     model = parse_urdf(name, urdf, floating)
-    start = clamp_to_limits(model, pin.neutral(model)) if posture is None else posture
+    start = clamp_to_limits(model, pin.neutral(model))
     robot = _make_robot(
         name,
         urdf,
         model,
-        start,
+        with_angles(name, model, start, posture),
         locked,
         torque_limits,
+        feet,
+        foot_radius,
         package_dirs=directories,
-        feet=_as_feet(feet, foot_radius),
     )
-    _warn_if_motors_are_weak(robot)
-    warn_if_it_cannot_stand(robot)
-    if posture is None:
-        _warn_if_legs_are_singular(robot)
-    if torque_limits is None:
-        _warn_if_joints_are_passive(robot)
-    return robot
+    messages = [
+        passive_joints_message(robot) if torque_limits is None else "",
+        missing_meshes_message(robot) if directories else "",
+    ]
+    return _checked(robot, feet, messages, bend_legs=posture is None)
 
 
 def load_mjcf(
@@ -303,10 +302,10 @@ def load_mjcf(
     *,
     name: str | None = None,
     floating: bool | None = None,
-    feet: Sequence[str | Foot] = (),
+    feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    posture: npt.ArrayLike | str | None = None,
+    posture: npt.ArrayLike | Mapping[str, float] | str | None = None,
     locked: Sequence[str] = (),
 ) -> Robot:
     """Load your own robot from an MJCF, the file format of MuJoCo.
@@ -325,15 +324,17 @@ def load_mjcf(
         Whether the base can move freely; by default, whether it has a free joint in the file. With
         True, a free joint replaces the joints between the base and the world.
     feet : sequence of str or Foot, optional
-        Bodies, sites, geoms or `Foot` values that can touch the ground; none by default.
+        Bodies, sites, geoms or `Foot` values that can touch the ground; by default as in
+        `load_urdf`.
     foot_radius : float, optional
-        Radius of the feet that are given as names [m]; 0 by default.
+        Radius of the feet that are given as names [m]; by default as in `load_urdf`.
     torque_limits : float or array_like, shape (d,), optional
         Torque limits [N·m]; by default what the actuators and joints of the file allow.
-    posture : str or array_like, shape (nq,) or (nq - 7,), optional
+    posture : str, array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked: the name of a keyframe, or
-        numbers as in `load_urdf`. By default the first keyframe, or the file's initial
-        configuration, with joints brought within their limits.
+        positions as in `load_urdf`, where a mapping changes the default. This is the first
+        keyframe, with joints brought within their limits. In a file without keyframes it is the
+        initial configuration, with bent legs as in `load_urdf`.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
@@ -370,19 +371,19 @@ def load_mjcf(
         name,
         mjcf.urdf,
         mjcf.model,
-        mjcf.posture if posture is None or isinstance(posture, str) else posture,
+        with_angles(name, mjcf.model, mjcf.posture, None if keyframe else posture),
         locked,
         torque_limits,
+        feet,
+        foot_radius,
         package_dirs=(mjcf.folder,),
-        feet=_as_feet(feet, foot_radius),
     )
-    if mjcf.differences:
-        message = f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."
-        warnings.warn(message, RobotWarning, stacklevel=2)
-    _warn_if_motors_are_weak(robot)
-    if posture is None:
-        _warn_if_legs_are_singular(robot)
-    return robot
+    messages = (
+        [f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."]
+        if mjcf.differences
+        else []
+    )
+    return _checked(robot, feet, messages, bend_legs=posture is None and not mjcf.has_keyframes)
 
 
 def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
@@ -402,6 +403,11 @@ def _make_robot(
     posture: npt.ArrayLike,
     locked: Sequence[str],
     torque_limits: npt.ArrayLike | None,
+    feet: Sequence[str | Foot] | None,
+    foot_radius: float | None,
+    known_feet: tuple[Foot, ...] | None = None,
+    *,
+    package_dirs: tuple[Path, ...],
     **fields: Any,
 ) -> Robot:
     """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
@@ -428,79 +434,25 @@ def _make_robot(
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
-    return Robot(name, model, urdf, posture=posture, torque_limits=torque_limits, **fields)  # type: ignore[arg-type]  # it checks
+    posture = as_posture(name, model, posture)
+    feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
 
 
-def _warn_if_motors_are_weak(robot: Robot) -> None:
-    """Warn if the motors of a fixed-base robot cannot hold its posture against gravity.
-
-    The warning points at the code that called the loading function.
-    """
-    if robot.is_floating:
-        return
-    gravity_torques = np.abs(
-        pin.computeGeneralizedGravity(
-            robot.model, robot.model.createData(), np.array(robot.posture)
-        )
-    )
-    weak = [
-        f"{joint} needs {required:.3g} and has {limit:.3g}"
-        for joint, required, limit in zip(
-            robot.joint_names, gravity_torques, robot.torque_limits, strict=True
-        )
-        if required > limit
-    ]
-    if weak:
-        message = (
-            f"{robot.name} will sink: its motors are too weak to hold its posture against "
-            f"gravity (N·m or N): {', '.join(weak)}."
-        )
-        warnings.warn(message, RobotWarning, stacklevel=3)
-
-
-def _warn_if_joints_are_passive(robot: Robot) -> None:
-    """Warn if only some joints have a torque limit in the URDF: the others may have no motor.
-
-    The warning points at the code that called the loading function.
-    """
-    unlimited = np.array(robot.joint_names)[np.isinf(robot.torque_limits)].tolist()
-    if 0 < len(unlimited) < robot.d:
-        message = (
-            f"The URDF of {robot.name} gives no effort, or effort=0, for {', '.join(unlimited)}. "
-            f"Their motors have no torque limits. If these joints are passive, for example in a "
-            f"closed loop, lock them with locked=[…]. Otherwise, pass torque_limits."
-        )
-        warnings.warn(message, RobotWarning, stacklevel=3)
-
-
-def _warn_if_legs_are_singular(robot: Robot) -> None:
-    """Warn if a foot of a floating-base robot moves in fewer directions than with a bent leg.
-
-    The warning points at the code that called the loading function.
-    """
-    if not robot.is_floating:
-        return
-    bend = np.r_[np.zeros(6), np.full(robot.d, _BEND)]
-    posture = np.array(robot.posture)
-    present, bent = (State(robot, q) for q in (posture, pin.integrate(robot.model, posture, bend)))
-    singular = []
-    for foot in robot.feet:
-        rows = 6 if foot.is_flat else 3
-        values, bent_values = (
-            np.linalg.svd(state.frame_jacobian(foot.frame)[:rows, 6:], compute_uv=False)
-            for state in (present, bent)
-        )
-        rank = int((bent_values > _MIN_SINGULAR_VALUE * bent_values[:1].sum()).sum())
-        if (values[:rank] < _MIN_SINGULAR_VALUE * values[:1].sum()).any():
-            singular.append(foot.frame)
-    if singular:
-        message = (
-            f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
-            f"The legs of {', '.join(singular)} are then singular, for example straight, and "
-            f"cannot move their feet in all directions. Pass posture=[…] with bent legs to "
-            f"load_urdf: {robot.nq - 7} joint positions."
-        )
-        warnings.warn(message, RobotWarning, stacklevel=3)
+def _checked(
+    robot: Robot,
+    feet: Sequence[str | Foot] | None,
+    messages: Sequence[str] = (),
+    bend_legs: bool = False,
+) -> Robot:
+    """Return a robot, with bent legs if requested, after warnings about it and further ones."""
+    if bend_legs:
+        robot = with_bent_legs(robot)
+        messages = [*messages, straight_legs_message(robot)]
+    for message in (*messages, *problems(robot, feet or ())):
+        if message:
+            warn(message, RobotWarning)
+    return robot
 
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
@@ -569,29 +521,3 @@ def _posture_of_modified_robot(name: str, loader: Any, model: pin.Model) -> Arra
     if loader.free_flyer:
         q[:7] = pin.SE3ToXYZQUAT(loaded.model.jointPlacements[1] * pin.XYZQUATToSE3(q[:7]))
     return clamp_to_limits(model, q)
-
-
-def _limb_ends(model: pin.Model) -> list[str]:
-    """Return the names of the links at the ends of limbs: feet, fingers, heads.
-
-    These links are behind the last joint of a limb and carry no other link.
-    """
-    frames, parent_joints = model.frames, set(model.parents)
-    bodies = [frame for frame in frames if frame.type == pin.FrameType.BODY]
-    # the parent of a link is the frame of a joint
-    parents = {frames[frames[frame.parentFrame].parentFrame].name for frame in bodies}
-    return [
-        str(frame.name)
-        for frame in bodies
-        if frame.name not in parents and frame.parentJoint not in parent_joints
-    ]
-
-
-def _as_feet(requested: Sequence[str | Foot], radius: float | None) -> tuple[Foot, ...]:
-    """Return feet, given as frames or `Foot` values, as `Foot` values."""
-    if isinstance(requested, str) or not isinstance(requested, Sequence):
-        raise InputError(
-            f'feet must be a list of frames, as in feet=["FL_foot"], not {short_repr(requested)}.'
-        )
-    r = 0.0 if radius is None else as_positive("foot_radius", radius, "m", allow_zero=True)
-    return tuple(foot if isinstance(foot, Foot) else Foot(foot, r) for foot in requested)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from floatbase._validation import Array
-from floatbase.errors import InputError, RobotWarning
+from floatbase.errors import InputError
 from floatbase.qp import QP, solve
+from floatbase.robots._shapes import missing_meshes
+from floatbase.robots.feet import singular_legs
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
@@ -22,21 +24,90 @@ _BALANCE_WEIGHT, _FORCE_WEIGHT = 1e6, 1e-6
 _TOLERANCE = 1e-2  # fraction of a torque limit by which the torques of the QP may be wrong
 
 
-def warn_if_it_cannot_stand(robot: Robot) -> None:
-    """Warn if a floating-base robot is in wrong units, upside down or too weak to stand.
-
-    The warning points at the code that called the loading function.
-    """
-    if not robot.is_floating or not robot.weight:
-        return
+def problems(robot: Robot, given_feet: Sequence[str | Foot]) -> list[str]:
+    """Return warnings about a robot that cannot stand, or sinks if its base is fixed."""
+    if not robot.is_floating:
+        return [_weak_arm_message(robot)]
     posture = State(robot, robot.posture)
-    message = (
+    return [
         _units_message(robot, posture)
         or _upside_down_message(robot, posture)
-        or _weak_motors_message(robot)
+        or _weak_motors_message(robot),
+        _points_message(robot, given_feet),
+    ]
+
+
+def straight_legs_message(robot: Robot) -> str:
+    """Return a warning if legs are straight in the posture chosen for a robot, else ""."""
+    straight = singular_legs(robot) if robot.is_floating else []
+    if not straight:
+        return ""
+    return (
+        f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
+        f"The legs of {', '.join(straight)} are then singular, for example straight, and "
+        f"cannot move their feet in all directions. Pass a posture with bent legs, such as "
+        f'posture={{"name of a knee": 0.6}}, or {robot.nq - 7} joint positions.'
     )
-    if message:
-        warnings.warn(message, RobotWarning, stacklevel=3)
+
+
+def passive_joints_message(robot: Robot) -> str:
+    """Return a warning if only some joints have a torque limit: the others may have no motor."""
+    unlimited = np.array(robot.joint_names)[np.isinf(robot.torque_limits)].tolist()
+    if not 0 < len(unlimited) < robot.d:
+        return ""
+    return (
+        f"The URDF of {robot.name} gives no effort, or effort=0, for {', '.join(unlimited)}. "
+        f"Their motors have no torque limits. If these joints are passive, for example in a "
+        f"closed loop, lock them with locked=[…]. Otherwise, pass torque_limits."
+    )
+
+
+def missing_meshes_message(robot: Robot) -> str:
+    """Return a warning if mesh files do not exist, else ""."""
+    missing = missing_meshes(robot.urdf, robot.package_dirs)
+    if not missing:
+        return ""
+    more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
+    return (
+        f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Its link is "
+        f"represented by other shapes or a box. Give the folder that contains the meshes or "
+        f"their package, as in package_dirs=[…]."
+    )
+
+
+def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
+    """Return a warning if a robot touches the ground at one or two points not given as `Foot`."""
+    is_stable = any(foot.is_flat or foot in given_feet for foot in robot.feet)
+    if is_stable or not 1 <= len(robot.feet) <= 2:
+        return ""
+    names = [foot.frame for foot in robot.feet]
+    return (
+        f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
+        f"point(s) only: {', '.join(names)}. If it has soles, give their corners, as in "
+        f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+    )
+
+
+def _weak_arm_message(robot: Robot) -> str:
+    """Return a warning if the motors of a fixed-base robot cannot hold its posture, else ""."""
+    torques = np.abs(State(robot, robot.posture).h)
+    weak = _too_weak(robot, torques, robot.torque_limits)
+    if not weak:
+        return ""
+    return (
+        f"{robot.name} will sink: its motors are too weak to hold its posture against "
+        f"gravity (N·m or N): {weak}."
+    )
+
+
+def _too_weak(robot: Robot, required: Array, tolerated: Array) -> str:
+    """Return which joints need more torque than is tolerated, with the limits of their motors."""
+    rows = zip(robot.joint_names, required, robot.torque_limits, tolerated, strict=True)
+    return ", ".join(
+        f"{joint} needs {torque:.3g} and has {limit:.3g}"
+        for joint, torque, limit, most in rows
+        if torque > most
+    )
 
 
 def _units_message(robot: Robot, posture: State) -> str:
@@ -91,18 +162,14 @@ def _weak_motors_message(robot: Robot) -> str:
     G = np.vstack([G, -np.eye(n + 1)[normals]])  # the ground does not pull
     h = np.concatenate([-gravity, gravity, np.zeros(len(normals))])
     x = solve(QP(H, g, np.zeros((0, n + 1)), np.zeros(0), G, h)).x
-    required = np.abs(gravity - torque_map @ x[:n]) * limits
-    names = np.array(robot.joint_names)[limited]
-    weak = [
-        f"{name} needs {torque:.3g} and has {limit:.3g}"
-        for name, torque, limit in zip(names, required, limits, strict=True)
-        if torque > (1.0 + _TOLERANCE) * limit
-    ]
+    required = np.zeros(robot.d)
+    required[limited] = np.abs(gravity - torque_map @ x[:n]) * limits
+    weak = _too_weak(robot, required, (1.0 + _TOLERANCE) * robot.torque_limits)
     if not weak:
         return ""
     return (
         f"{robot.name} cannot stand: its motors are too weak to carry it on its feet (N·m or N): "
-        f"{', '.join(weak)}. Check masses, lengths and the effort of the joints in the URDF, or "
+        f"{weak}. Check masses, lengths and the effort of the joints in the URDF, or "
         f"pass torque_limits."
     )
 

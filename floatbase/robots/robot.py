@@ -84,10 +84,15 @@ class Foot(Value):
         """Whether the foot stands on its corners rather than on one point."""
         return self.corners is not None
 
-    @property
+    @cached_property
+    def points(self) -> Array:
+        """Centre of the ball, or the corners, shape (n, 3), in the frame [m]."""
+        return self.centre[None] if self.corners is None else self.corners
+
+    @cached_property
     def middle(self) -> Array:
         """Centre of the ball, or mean of the corners, shape (3,), in the frame [m]."""
-        return self.centre if self.corners is None else read_only(self.corners.mean(axis=0))
+        return read_only(self.points.mean(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,10 +208,8 @@ class Robot(Value):
     @cached_property
     def _fingerprint(self) -> bytes:
         """Digest of the data for equations, simulation and viewer, the same in every process."""
-        shapes = [foot.centre if foot.corners is None else foot.corners for foot in self.feet]
         feet = [
-            (foot.frame, foot.radius, shape.shape, shape.tobytes())
-            for foot, shape in zip(self.feet, shapes, strict=True)
+            (foot.frame, foot.radius, foot.is_flat, foot.points.tobytes()) for foot in self.feet
         ]
         numbers = self.torque_limits.tobytes(), self.posture.tobytes()
         return sha256(

@@ -145,8 +145,7 @@ def _clearance(
     distances = normals @ middle - offsets
     nearest = int(np.argmin(distances))
     if surface is not None:
-        corners = () if foot.corners is None else tuple(foot.corners)
-        under = [state.point(foot.frame, point)[:2] for point in (foot.middle, *corners)]
+        under = [state.point(foot.frame, point)[:2] for point in (foot.middle, *foot.points)]
         tops = [
             top for xy in under if (top := surface(xy)) > _plane_height(xy, planes) + _LEAST_RISE
         ]

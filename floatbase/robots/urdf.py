@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
 from collections.abc import Collection
@@ -14,7 +13,7 @@ import pinocchio as pin
 
 from floatbase._files import read_file
 from floatbase._validation import Array, short_repr
-from floatbase.errors import InputError, RobotWarning
+from floatbase.errors import InputError, RobotWarning, warn
 from floatbase.robots._checks import has_floating_base
 from floatbase.robots.inertia import read_inertia, read_numbers
 
@@ -83,7 +82,7 @@ def normalize_urdf(name: str, text: str, floating: bool) -> str:
     """Return a URDF that Pinocchio, MuJoCo and Python's XML read in the same way.
 
     Only links, joints and materials remain. All their numbers are checked. A floating base is the
-    first link with mass. A warning about ignored content points at the caller's caller.
+    first link with mass. Ignored content is warned about.
     """
     root = _parse_xml(name, text)
     ignored = [
@@ -96,7 +95,7 @@ def normalize_urdf(name: str, text: str, floating: bool) -> str:
             f"MuJoCo's settings in the URDF of {name} are ignored: {', '.join(ignored)}. They "
             f"would change the simulation, but not the controller."
         )
-        warnings.warn(message, RobotWarning, stacklevel=3)
+        warn(message, RobotWarning)
     _normalize_element(root, name)
     base = _check_tree(name, root)
     for joint in root.findall("joint"):

@@ -10,6 +10,7 @@ import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -61,7 +62,8 @@ def build_model(robot: Robot, ground: Ground, timestep: float, losses: bool) -> 
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
     """
-    return copy.copy(_compiled_model(robot, _ground_data(ground), timestep, losses))
+    folders = robot.package_dirs
+    return copy.copy(_compiled_model(robot, folders, _ground_data(ground), timestep, losses))
 
 
 def build_spec(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjSpec:
@@ -87,9 +89,12 @@ def _ground_data(ground: Ground) -> _GroundData:
 
 @lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
 def _compiled_model(
-    robot: Robot, ground: _GroundData, timestep: float, losses: bool
+    robot: Robot, folders: tuple[Path, ...], ground: _GroundData, timestep: float, losses: bool
 ) -> mujoco.MjModel:
-    """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it."""
+    """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it.
+
+    Equal robots with meshes in other folders can have other hulls.
+    """
     try:
         model = _build_spec(robot, ground, timestep, losses).compile()
     except ValueError as error:
@@ -286,10 +291,9 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
             f"The foot {foot.frame} is not a link of the URDF. Give feet by the names of their "
             f"links."
         )
-    if foot.corners is None:
-        centres, radius = foot.centre[None], max(foot.radius, _MIN_BALL_RADIUS)
-    else:
-        centres, radius = foot.corners + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
+    centres, radius = foot.points, max(foot.radius, _MIN_BALL_RADIUS)
+    if foot.is_flat:
+        centres, radius = centres + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
         body.add_geom(
             name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1
@@ -299,7 +303,7 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:
     """Add the massless hulls of links; they stop at once on impact and leave the ground slowly."""
     impact_time = max(_IMPACT_TIME, 4.0 * spec.option.timestep)
-    for joint_id, points in link_hulls(robot):
+    for joint_id, points in link_hulls(robot, robot.package_dirs):
         joint = spec.joint(robot.model.names[joint_id])  # None for the free joint: its name differs
         body = spec.body(body_name(robot.base)) if joint is None else joint.parent
         mesh = spec.add_mesh(name=f"hull of {body.name}", uservert=points.ravel())

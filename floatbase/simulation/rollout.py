@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
@@ -22,7 +21,7 @@ from floatbase._validation import (
 )
 from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts
-from floatbase.errors import FloatbaseError, InputError, SimulationWarning
+from floatbase.errors import FloatbaseError, InputError, SimulationWarning, warn
 from floatbase.simulation.after_fall import record_settling
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push, active_pushes, as_pushes
@@ -156,7 +155,7 @@ def rollout(
         )
     warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if warning:
-        warnings.warn(warning, SimulationWarning, stacklevel=2)
+        warn(warning, SimulationWarning)
     record = Recorder(sim, _current_stance(sim, controller), ticks + settling_ticks, substeps)
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:

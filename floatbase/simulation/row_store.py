@@ -6,7 +6,6 @@ import fcntl
 import hashlib
 import json
 import os
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +15,7 @@ import numpy as np
 
 from floatbase._files import LARGEST_DATA, open_file, read_file
 from floatbase._validation import short_repr
-from floatbase.errors import InputError, SimulationWarning, require
+from floatbase.errors import InputError, SimulationWarning, require, warn
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -89,11 +88,10 @@ class RowStore:
         """Close the file and release its lock."""
         if self._file >= 0:
             if not os.fstat(self._file).st_nlink:
-                warnings.warn(
+                warn(
                     f"{self._path} was removed while the sweep ran, so no file has its rows. They "
                     f"are in the table that sweep returns; save the table.",
                     SimulationWarning,
-                    stacklevel=4,
                 )
             os.close(self._file)
             self._file = -1

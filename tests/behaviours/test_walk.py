@@ -26,7 +26,7 @@ from numpy.testing import assert_allclose
 import floatbase as fb
 from floatbase.behaviours import Gains, Gait, Stand, Walk, raibert_foothold
 from floatbase.errors import InputError, SimulationWarning
-from floatbase.robots import Robot
+from floatbase.robots import Foot, Robot
 from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
@@ -339,7 +339,7 @@ def test_gaits_that_sway_are_refused_unless_there_is_friction():
 
 
 def test_a_biped_on_points_walks_by_default():
-    robot = fb.load("bolt", feet=["FL_FOOT", "FR_FOOT"])
+    robot = fb.load("bolt", feet=[Foot("FL_FOOT"), Foot("FR_FOOT")])
     record = run(Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot)), 2.0)
     assert record.outcome == "completed" and np.linalg.norm(record.final.com[:2]) < 0.3
 

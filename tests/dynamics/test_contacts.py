@@ -276,7 +276,7 @@ def test_feet_are_taken_as_they_are_flat_or_round():
 
 def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts():
     robot = judges.load("go2")
-    legs = fb.load_urdf(robot.urdf, posture=robot.posture)
+    legs = fb.load_urdf(robot.urdf, feet=[], posture=robot.posture)
     refused(lambda: fb.Contacts.feet(legs), InputError, "Contacts.points", "feet")
     assert len(fb.Simulation(legs).feet) == 0
     assert len(fb.Contacts.feet(judges.load("ur5"))) == 0

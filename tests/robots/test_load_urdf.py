@@ -132,7 +132,7 @@ def test_a_joint_that_is_called_like_a_link_can_be_locked_and_be_named_twice():
 def test_a_robot_is_what_its_file_was_when_it_was_loaded(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(fb.load("ur5").urdf, encoding="utf-8")
-    arm = fb.load_urdf(file, floating=False)
+    arm = fb.load_urdf(file, floating=False, package_dirs=fb.load("ur5").package_dirs)
     file.write_text("<robot/>")
     state = pickle.loads(pickle.dumps(with_floating_base(arm))).random_state(0)
     assert judges.relative(state.M, judges.Mujoco(state.robot).move_to(state).M) < 1e-9
@@ -218,21 +218,6 @@ def test_a_file_that_cannot_be_used_is_named(tmp_path):
     broken = tmp_path / "broken.urdf"
     broken.write_text("<robot>")
     refused(lambda: fb.load_urdf(broken), InputError, "broken", "URDF")
-
-
-@pytest.mark.parametrize("name", ["solo12", "talos", "go2"])
-def test_straight_legs_are_reported_if_no_posture_is_given(name):
-    robot = judges.load(name)
-    feet = list(robot.feet)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        fb.load_urdf(robot.urdf, feet=feet, posture=robot.posture)
-        fb.load_urdf(robot.urdf)  # no feet, so no legs
-        if name == "go2":  # its limits keep the knees bent
-            fb.load_urdf(robot.urdf, feet=feet)
-            return
-    with warns(RobotWarning, "posture", feet[0].frame, robot.d):
-        fb.load_urdf(robot.urdf, feet=feet)
 
 
 def go2_again(**options):

@@ -48,8 +48,6 @@ def test_an_unknown_name_is_refused_with_similar_names(case):
 @pytest.mark.parametrize(
     "case",
     [
-        (lambda: fb.load("anymal"), "anymal", "feet", "LF_FOOT", "RH_FOOT"),
-        (lambda: fb.load("iris"), "iris", "feet"),
         (lambda: fb.load("cassie"), "cassie", "go2"),
         (lambda: fb.load("go2", feet=["FL_foot", "FL_foot"]), "FL_foot", "go2"),
         (lambda: fb.load("go2", feet="FL_foot"), "feet", "FL_foot"),

@@ -74,7 +74,7 @@ def test_a_standing_robot_has_every_foot_on_the_ground_and_rests(floating):
         body = judge.body(foot.frame)
         R, p = judge.data.xmat[body].reshape(3, 3), judge.data.xpos[body]
         placement = floating.model.frames[floating.frame_id(foot.frame)].placement
-        for local in [foot.centre] if foot.corners is None else foot.corners:
+        for local in foot.points:
             point = p + R @ (placement.rotation @ local + placement.translation)
             assert point[2] - foot.radius == pytest.approx(0.0, abs=1e-9)
     assert not np.any(state.v)

@@ -227,14 +227,21 @@ def test_a_copy_of_a_robot_that_lies_moves_alone(copied):
     assert sim.link_collisions and sim.time == pytest.approx(sim.timestep)
 
 
-def test_a_robot_without_its_meshes_keeps_the_primitives():
-    """Without mesh files, the robot is built with the hulls of boxes and cylinders."""
+def test_a_robot_without_its_meshes_keeps_a_hull_for_every_link():
+    """A link without its mesh file has the hull of another shape, or a box with its inertia."""
     robot = judges.load("anymal_kinova")
     bare = fb.load_urdf(robot.urdf, feet=list(robot.feet), posture=robot.posture)
     sims = [fb.Simulation(one) for one in (bare, robot)]
     for sim in sims:
         sim.link_collisions = True
-    assert 0 < sims[0].model.nmesh < sims[1].model.nmesh
+    bare_sizes, sizes = (
+        {sim.model.geom(i).name: sim.model.geom_rbound[i] for i in range(sim.model.ngeom)}
+        for sim in sims
+    )
+    assert sims[0].model.nmesh == sims[1].model.nmesh > 0
+    # a box of a link's inertia has about its size
+    assert all(0.3 * size < bare_sizes[name] < 3.0 * size for name, size in sizes.items() if size)
+    assert bare_sizes != sizes
 
 
 def test_an_arm_that_is_bolted_to_the_ground_has_no_hulls():

@@ -14,10 +14,13 @@ from numpy.testing import assert_allclose
 from waiting import PATIENCE, until
 
 from floatbase.__main__ import main, start_when_connected
+from floatbase.errors import InputError
 from floatbase.playground import Playground, RealTimeFactor
 from floatbase.robots import catalogue, load
 
 from .looks import control, eventually, picture
+
+SIDES = ("left", "right")
 
 
 def test_the_robots_are_listed(capsys):
@@ -33,9 +36,32 @@ def test_wrong_arguments_are_a_message_and_not_a_traceback(tmp_path, capsys):
         (["go2", "--port", "99999"], "port", 99999),
         ([str(file), "--feet", "FL_FOTT"], "FL_FOTT"),
         ([str(tmp_path / "none.urdf")], "none.urdf"),
+        ([str(file), "--posture", "FL_KFE"], "--posture", "FL_KFE"),
+        (["go2", "--posture", "*_cal=1"], "*_cal", "FL_calf_joint"),
     ):
         assert main(["view", *arguments, "--no-browser"]) == 2
         assert not missing(capsys.readouterr().err, *named)
+
+
+def test_a_robot_is_described_by_the_arguments(tmp_path, monkeypatch):
+    file, g1, shown = tmp_path / "mine.urdf", load("g1"), []
+    file.write_text(g1.urdf)
+
+    def show(robot, *args, **options):
+        shown.append(robot)
+        raise InputError("shown")
+
+    monkeypatch.setattr("floatbase.playground.Playground", show)
+    folders = ["--package-dirs", *map(str, g1.package_dirs)]
+    for options in ([], ["--feet", "left_ankle_roll_link", "right_ankle_roll_link"]):
+        posture = ["--posture", "*_knee_joint=0.7", "left_knee_joint=0.6"]
+        assert main(["view", str(file), *folders, *options, *posture]) == 2
+        robot = shown[-1]
+        assert [foot.is_flat for foot in robot.feet] == [True, True]
+        knees = [robot.posture[7:][robot.joint_names.index(f"{s}_knee_joint")] for s in SIDES]
+        assert knees == [0.6, 0.7]
+    assert main(["view", "go2", "--feet"]) == 2
+    assert shown[-1].feet == ()
 
 
 @pytest.mark.front_end
@@ -43,6 +69,8 @@ def test_a_user_defined_urdf_is_shown(tmp_path):
     file, solo = tmp_path / "mine.urdf", load("solo12")
     file.write_text(solo.urdf)
     options = ["--feet", *(foot.frame for foot in solo.feet), "--foot-radius", "0.01"]
+    options += ["--posture", "*_HFE=0.7", "FL_KFE=-1.4", "--package-dirs"]
+    options += map(str, solo.package_dirs)
     command = [sys.executable, "-m", "floatbase", "view", str(file), "--no-browser", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert "mine at http://127.0.0.1" in process.stdout.readline()

@@ -2,6 +2,7 @@
 
 import re
 import sys
+import warnings
 from pathlib import Path
 
 import judges
@@ -11,7 +12,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from floatbase.dynamics import Contacts
+from floatbase.errors import RobotWarning
 from floatbase.robots import catalogue, load, load_urdf, with_floating_base
+from floatbase.simulation import Simulation
 from floatbase.viewer.scene.meshes import robot_meshes
 from floatbase.viewer.scene.visuals import urdf_visuals
 
@@ -130,3 +133,82 @@ def test_parts_of_a_locked_joint_move_with_its_parent():
     tip = stiff.standing().joint_transforms[3] @ [*meshes[-1].vertices[-1], 1.0] @ np.eye(4, 3)
     expected = home.joint_transforms[whole.joint] @ [*whole.vertices[-1], 1.0] @ np.eye(4, 3)
     assert_allclose(tip, expected, atol=1e-5)
+
+
+INCH = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset>{unit}<up_axis>Z_UP</up_axis></asset><library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="12">0 0 0 10 0 0 0 10 0 0 0 10</float_array>
+<technique_common><accessor source="#a" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+</source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
+"""
+
+
+def single_link(name, scale="", others=""):
+    """A URDF of one link of 12 kg that is drawn as a mesh."""
+    return (
+        f'<robot name="one"><link name="trunk"><inertial><mass value="12"/><inertia ixx="0.05" '
+        f'iyy="0.1" izz="0.13" ixy="0" ixz="0" iyz="0"/></inertial><visual><geometry><mesh '
+        f'filename="{name}" {scale}/></geometry></visual>{others}</link></robot>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "scale", "size"),
+    [
+        ('<unit meter="0.0254" name="inch"/>', "", 0.254),
+        ('<unit name="millimeter" meter="0.001"/>', 'scale="2 2 2"', 0.02),
+        ("", "", 10.0),
+        ('<unit name="meter"/>', "", 10.0),
+    ],
+)
+def test_collada_files_are_drawn_and_collide_in_their_unit(unit, scale, size, tmp_path):
+    pytest.importorskip("trimesh", reason="meshes are read with trimesh")
+    (tmp_path / "part.dae").write_text(INCH.format(unit=unit), encoding="utf-8")
+    (tmp_path / "one.urdf").write_text(single_link("part.dae", scale), encoding="utf-8")
+    robot = load_urdf(tmp_path / "one.urdf", name=f"one of {size} m {unit}")
+    (mesh,) = robot_meshes(robot)
+    for points in (mesh.vertices, Simulation(robot).model.mesh_vert):
+        lengths = np.linalg.norm(points[:, None] - points, axis=2)
+        assert_allclose(lengths.max(), size * np.sqrt(2.0), rtol=1e-5)
+
+
+def test_meshes_are_found_in_the_package_around_the_file(tmp_path):
+    (tmp_path / "my_robot" / "urdf").mkdir(parents=True)
+    (tmp_path / "copy" / "urdf").mkdir(parents=True)
+    for package in ("my_robot", "copy"):  # a copy need not have the name of the package
+        (tmp_path / package / "part.dae").write_text(INCH.format(unit=""), encoding="utf-8")
+        file = tmp_path / package / "urdf" / "one.urdf"
+        for name in (
+            "package://my_robot/part.dae",
+            "../part.dae",
+            f"file://{file.parents[1]}/part.dae",
+        ):
+            file.write_text(single_link(name), encoding="utf-8")
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                (mesh,) = robot_meshes(load_urdf(file))
+            assert len(mesh.faces) == 4, name
+
+
+CRATE = '<collision><geometry><box size="0.4 0.3 0.2"/></geometry></collision>'
+
+
+@pytest.mark.parametrize("content", [None, "", "no mesh"])
+@pytest.mark.parametrize(("others", "size"), [(CRATE, [0.4, 0.3, 0.2]), ("", [0.3, 0.2, 0.1])])
+def test_a_mesh_that_cannot_be_read_is_named_and_costs_only_its_own_link(
+    content, others, size, tmp_path
+):
+    pytest.importorskip("trimesh", reason="meshes are read with trimesh")
+    if content is not None:
+        (tmp_path / "part.stl").write_text(content, encoding="utf-8")
+    file = tmp_path / "one.urdf"
+    file.write_text(single_link("part.stl", others=others), encoding="utf-8")
+    with pytest.warns(RobotWarning, match="part.stl") as caught:
+        (mesh,) = robot_meshes(load_urdf(file))
+    assert len(caught) == 1
+    assert_allclose(np.ptp(mesh.vertices, axis=0), size, rtol=1e-5)

@@ -6,7 +6,6 @@ with the whole-body controller, eqs. (26), (27).
 
 from __future__ import annotations
 
-import warnings
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -50,7 +49,7 @@ from floatbase.behaviours.walk.swing import SwingPath
 from floatbase.behaviours.walk.targets import Adjustment, BodyPose
 from floatbase.control import Command, WholeBodyController
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError, SimulationWarning
+from floatbase.errors import InputError, SimulationWarning, warn
 from floatbase.objectives import Task
 from floatbase.robots import Robot, State
 
@@ -221,7 +220,7 @@ class Walk:
         )
         self._clear()
         self._prepare(self._gait)
-        self._limit_speed(stacklevel=3)
+        self._limit_speed()
 
     @property
     def robot(self) -> Robot:
@@ -253,7 +252,7 @@ class Walk:
         as_gait(gait, self._all_contacts, self.may_fly)
         self._prepare(gait)
         self._gait = gait
-        self._limit_speed(stacklevel=3)
+        self._limit_speed()
 
     @property
     def velocity(self) -> Array:
@@ -263,7 +262,7 @@ class Walk:
     @velocity.setter
     def velocity(self, velocity: npt.ArrayLike) -> None:
         self._velocity = as_velocity(velocity)
-        self._limit_speed(stacklevel=3)
+        self._limit_speed()
 
     @property
     def yaw_rate(self) -> float:
@@ -273,7 +272,7 @@ class Walk:
     @yaw_rate.setter
     def yaw_rate(self, yaw_rate: float) -> None:
         self._yaw_rate = as_yaw_rate(yaw_rate)
-        self._limit_speed(stacklevel=3)
+        self._limit_speed()
 
     @property
     def height(self) -> float:
@@ -491,7 +490,7 @@ class Walk:
             check_friction(gait, self._posture, self._all_contacts, facets, inner)
         self._controllers.prepare(gait)
 
-    def _limit_speed(self, stacklevel: int) -> None:
+    def _limit_speed(self) -> None:
         """Update `speed_fraction`, and warn if the feet cannot follow the desired motion."""
         motion = np.array([*self._velocity, self._yaw_rate])
         # fractions in the first period, and later
@@ -500,7 +499,7 @@ class Walk:
         )
         message = motion_message(self, self._gait, self._posture.state, self.speed_fraction)
         if message:
-            warnings.warn(message, SimulationWarning, stacklevel=stacklevel)
+            warn(message, SimulationWarning)
         self._refresh()
 
     def _refresh(self) -> None:

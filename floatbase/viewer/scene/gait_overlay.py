@@ -122,10 +122,10 @@ def _foot(robot: Robot, name: str) -> Foot:
 def _outline(foot: Foot, at: Array, rotation: Array, size: float) -> Item:
     """Draw where a foot will stand."""
     at = at + [0.0, 0.0, _HEIGHT_ABOVE_GROUND * size]
-    if foot.corners is None:
+    if not foot.is_flat:
         radius = max(2.0 * foot.radius, 0.04 * size)
         return Item(_ring(COLOUR, 0.72), transform(at, rotation, radius))
-    corners = np.round(foot.corners[:, :2] - foot.corners[:, :2].mean(axis=0), 4)
+    corners = np.round((foot.points - foot.middle)[:, :2], 4)
     width = round(_OUTLINE_WIDTH * size, 4)
     return Item(_foot_outline(tuple(map(tuple, corners.tolist())), width), transform(at, rotation))
 

@@ -140,11 +140,7 @@ class Painter:
     def feet_box(self) -> tuple[Array, Array]:
         """Lowest and highest corner of a box around the standing robot's feet, world frame [m]."""
         feet = [(foot, self.standing.frame_pose(foot.frame)) for foot in self.robot.feet]
-        points = [
-            pose.act(p)
-            for foot, pose in feet
-            for p in ([foot.centre] if foot.corners is None else foot.corners)
-        ]
+        points = [pose.act(p) for foot, pose in feet for p in foot.points]
         if not points:
             return self.box
         around = 0.2 * self.size * np.array([1.0, 1.0, 0.0])

@@ -8,7 +8,6 @@ trimesh, and pycollada for .dae files.
 from __future__ import annotations
 
 import io
-import warnings
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase.robots import Robot
+from floatbase.robots._shapes import link_shapes
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,28 +41,27 @@ def urdf_visuals(robot: Robot) -> list[VisualMesh]:
     """Read all visuals of a robot's URDF."""
     import trimesh  # noqa: F401  raises at once if it is missing
 
-    folders = [str(folder) for folder in robot.package_dirs]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        geometry = pin.buildGeomFromUrdfString(
-            robot.model, robot.urdf, pin.VISUAL, package_dirs=folders
-        )
-    return [piece for item in geometry.geometryObjects for piece in _pieces(item)]
+    items, _ = link_shapes(robot.model, robot.urdf, robot.package_dirs, pin.VISUAL)
+    return [piece for item in items for piece in _pieces(item)]
 
 
 def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
     """Return the pieces of one visual, one for each of its materials."""
     import trimesh
 
+    scale = np.asarray(item.meshScale).ravel()
     if not Path(item.meshPath).is_file():
         meshes = [_primitive(item.geometry)]
     else:
-        dump = _scene(Path(item.meshPath)).dump()
+        try:
+            dump = _scene(Path(item.meshPath)).dump()
+        except Exception:  # trimesh raises errors of many libraries; Pinocchio has read the file
+            dump, scale = [_as_mesh(item.geometry)], np.ones(3)
         meshes = [mesh for mesh in dump if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     pieces = []
     for mesh in meshes:
         plain = trimesh.Trimesh(mesh.vertices, mesh.faces)
-        plain.apply_scale(np.asarray(item.meshScale).ravel())
+        plain.apply_scale(scale)
         plain.apply_transform(item.placement.homogeneous)
         pieces.append(
             VisualMesh(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem)
@@ -94,6 +93,14 @@ def _without_textures(path: Path) -> bytes:
                     map(str, (*DARK, 1.0))
                 )
     return ElementTree.tostring(root)
+
+
+def _as_mesh(shape: Any) -> trimesh.Trimesh:
+    """Return a mesh as Pinocchio has read it."""
+    import trimesh
+
+    faces = [list(shape.tri_indices(i)) for i in range(shape.num_tris)]
+    return trimesh.Trimesh(np.array(shape.vertices()), faces)
 
 
 def _primitive(shape: Any) -> trimesh.Trimesh:

@@ -1,0 +1,324 @@
+"""Feet found from the shapes of a robot's links, and a posture in which its legs are bent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from floatbase._validation import Array, as_positive, short_repr
+from floatbase.errors import InputError
+from floatbase.robots._checks import clamp_to_limits, has_floating_base, joint_limits
+from floatbase.robots._shapes import link_shapes, shape_points
+from floatbase.robots.robot import Foot, Robot
+from floatbase.robots.state import State
+
+_LEVEL = 0.05  # of the robot's height: by how much the ends of legs may differ in height
+# with fewer joints, a leg cannot choose both the position of its sole and the way the sole faces
+_SOLE_JOINTS = 5
+_MIN_UPRIGHT = 0.9  # vertical component of the z axis of a frame in which a sole can be given
+_SOLE_DEPTH = 0.02  # of a foot's size: points that are higher above the lowest one do not touch
+_MIN_SOLE = 0.4  # least length and width of a sole, relative to those of the foot
+_MAX_ECCENTRICITY = 0.25  # of a wheel: distance of its middle from its axis, relative to its radius
+_BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
+# ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
+# about sin θ / 5 for two equal links that are θ from straight, so this is 3°
+_MIN_SINGULAR_VALUE = 0.01
+_CROUCH = 0.05  # of a leg's height: by how much bent legs are shorter than straight ones
+_KICK = 0.3  # rad or m: first change of the joints of a straight leg, which shows how it bends
+_NEARNESS = 1e-3  # weight of the joints' distance from the given posture: m per rad
+_MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull of `_NEARNESS`
+
+# of a joint's range: how far its middle is from the posture if the joint bends to one side only
+_ONE_SIDED = 0.1
+_DIGITS = 6  # of lengths [m], so that rounding errors do not show
+# the corners of a sole: front left, front right, rear right, rear left
+_DIAGONALS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+
+
+def as_feet(
+    requested: Sequence[str | Foot] | None,
+    radius: float | None,
+    model: pin.Model,
+    urdf: str,
+    folders: Sequence[Path],
+    q: Array,
+    known: tuple[Foot, ...] | None = None,
+) -> tuple[Foot, ...]:
+    """Return feet, given as frames or `Foot` values, known or found in the URDF."""
+    if requested is None:
+        if radius is not None:
+            raise InputError(
+                "foot_radius requires feet=[…], since other feet have their own radius."
+            )
+        if known is None and has_floating_base(model):
+            return _find_feet(model, urdf, folders, q)
+        return known or ()
+    if isinstance(requested, str) or not isinstance(requested, Sequence):
+        raise InputError(
+            f'feet must be a list of frames, as in feet=["FL_foot"], not {short_repr(requested)}.'
+        )
+    if radius is not None:
+        radius = as_positive("foot_radius", radius, "m", allow_zero=True)
+    return tuple(
+        foot
+        if isinstance(foot, Foot)
+        else _find_foot(model, urdf, folders, q, foot)
+        if radius is None and isinstance(foot, str)
+        else Foot(foot, radius or 0.0)
+        for foot in requested
+    )
+
+
+def with_bent_legs(robot: Robot) -> Robot:
+    """Return a robot whose legs are bent, or the robot itself if its joints do not allow it.
+
+    A posture of zeros in which no leg is straight stays as it is.
+    """
+    if not robot.is_floating or not robot.feet:
+        return robot
+    if not singular_legs(robot) and np.array_equal(robot.posture, pin.neutral(robot.model)):
+        return robot
+    posture = _bent_posture(robot)
+    bent = robot if posture is None else replace(robot, posture=posture)
+    return robot if singular_legs(bent) else bent
+
+
+def singular_legs(robot: Robot) -> list[str]:
+    """Return the feet that move in fewer directions than they would with bent legs."""
+    bend = np.r_[np.zeros(6), np.full(robot.d, _BEND)]
+    posture = np.array(robot.posture)
+    present, bent = (State(robot, q) for q in (posture, pin.integrate(robot.model, posture, bend)))
+    singular = []
+    for foot in robot.feet:
+        rows = 6 if foot.is_flat else 3
+        values, bent_values = (
+            np.linalg.svd(state.frame_jacobian(foot.frame)[:rows, 6:], compute_uv=False)
+            for state in (present, bent)
+        )
+        rank = int((bent_values > _MIN_SINGULAR_VALUE * bent_values[:1].sum()).sum())
+        if (values[:rank] < _MIN_SINGULAR_VALUE * values[:1].sum()).any():
+            singular.append(foot.frame)
+    return singular
+
+
+def _find_feet(model: pin.Model, urdf: str, folders: Sequence[Path], q: Array) -> tuple[Foot, ...]:
+    """Return the feet of a floating-base robot: the lowest ends of its limbs in a configuration.
+
+    A single such limb is more likely an arm.
+    """
+    ends = [joint for joint in range(2, model.njoints) if not model.children[joint]]
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    shapes = _shapes_of(model, urdf, folders, ends)
+    lowest = dict[int, tuple[float, str]]()  # height of the lowest point of a limb, and its link
+    for joint in ends:
+        heights = [
+            (float(_points(data.oMi[joint], shape)[:, 2].min()), _link_of(model, shape))
+            for shape in shapes
+            if shape.parentJoint == joint
+        ] or [
+            (float(data.oMf[model.getFrameId(link, pin.BODY)].translation[2]), link)
+            for link in _links_of(model, joint)
+        ]
+        if heights:
+            lowest[joint] = min(heights)
+    ground = min((height for height, _ in lowest.values()), default=0.0)
+    tolerance = _LEVEL * (max(placement.translation[2] for placement in data.oMi) - ground)
+    feet = [
+        _make_foot(model, data, shapes, [link, *_links_of(model, joint)])
+        for joint, (height, link) in lowest.items()
+        if height - ground < tolerance
+    ]
+    return tuple(feet) if len(feet) > 1 else ()
+
+
+def _find_foot(model: pin.Model, urdf: str, folders: Sequence[Path], q: Array, link: str) -> Foot:
+    """Return the foot that a link is, or a point at its origin if it has no shape or joint."""
+    if not model.existFrame(link, pin.BODY):
+        return Foot(link)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    joint = model.frames[model.getFrameId(link, pin.BODY)].parentJoint
+    return _make_foot(model, data, _shapes_of(model, urdf, folders, [joint]), [link])
+
+
+def _bent_posture(robot: Robot) -> Array | None:
+    """Return a posture whose legs are bent, or None if the joints do not allow it.
+
+    The feet are above their places at joint positions of zero, and soles are level.
+    """
+    from scipy.optimize import least_squares  # slow to import, and rarely needed
+
+    model, data, start = robot.model, robot.model.createData(), np.array(robot.posture)
+    frames = [robot.frame_id(foot.frame) for foot in robot.feet]
+    legs = sorted({i for f in frames for i in model.supports[model.frames[f].parentJoint]} - {0, 1})
+    if not legs:  # the feet belong to the base
+        return None
+    columns = np.array([model.idx_vs[i] for i in legs])
+
+    def feet(q: Array) -> list[tuple[Array, Array]]:
+        """Return the middle of each foot and the z axis of its frame."""
+        pin.framesForwardKinematics(model, data, q)
+        return [
+            (data.oMf[frame].act(np.array(foot.middle)), data.oMf[frame].rotation[:, 2])
+            for frame, foot in zip(frames, robot.feet, strict=True)
+        ]
+
+    def bend(x: Array) -> Array:
+        """Return the posture after a displacement of the legs' joints."""
+        v = np.zeros(model.nv)
+        v[columns] = x
+        return np.asarray(pin.integrate(model, start, v))
+
+    now, straight = feet(start), feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
+    top = max(data.oMi[i].translation[2] for i in legs)
+    targets = [
+        np.array([x, y, max(z + _CROUCH * (top - z), present[2])])
+        for ((x, y, z), _), (present, _) in zip(straight, now, strict=True)
+    ]
+
+    def errors(x: Array) -> Array:
+        rows = [
+            np.concatenate([middle - target, z_axis[:2] if foot.is_flat else []])
+            for (middle, z_axis), target, foot in zip(
+                feet(bend(x)), targets, robot.feet, strict=True
+            )
+        ]
+        return np.concatenate(rows)
+
+    lower, upper = np.full((2, model.nv), [[-np.inf], [np.inf]])
+    joints, index, low, high = joint_limits(model)
+    limited = np.array(model.idx_vs)[joints]
+    lower[limited], upper[limited] = low - start[index], high - start[index]
+    lower, upper = lower[columns], upper[columns]
+    side = np.clip(lower, -np.pi, None) + np.clip(upper, None, np.pi)
+    bends_one_way = np.abs(side) > _ONE_SIDED * (upper - lower)
+    kick = np.clip(_KICK * np.where(bends_one_way, np.sign(side), 1.0), lower, upper)
+    found = least_squares(
+        lambda x: np.concatenate([errors(x), _NEARNESS * x]), kick, bounds=(lower, upper)
+    )
+    return (
+        clamp_to_limits(model, bend(found.x.round(_DIGITS)))
+        if abs(errors(found.x)).max() < _MAX_ERROR
+        else None
+    )
+
+
+def _links_of(model: pin.Model, joint: int) -> list[str]:
+    """Return the links that a joint moves directly."""
+    return [str(f.name) for f in model.frames if f.parentJoint == joint and f.type == pin.BODY]
+
+
+def _link_of(model: pin.Model, shape: Any) -> str:
+    """Return the link of a shape."""
+    return str(model.frames[shape.parentFrame].name)
+
+
+def _shapes_of(
+    model: pin.Model, urdf: str, folders: Sequence[Path], joints: Sequence[int]
+) -> list[Any]:
+    """Return the shapes of the links that joints move, without stand-ins for missing meshes."""
+    links = {link for joint in joints for link in _links_of(model, joint)}
+    shapes, incomplete = link_shapes(model, urdf, folders, links=links)
+    return [
+        shape
+        for shape in shapes
+        if _link_of(model, shape) not in incomplete and len(shape_points(shape.geometry))
+    ]
+
+
+def _points(placement: pin.SE3, shape: Any) -> Array:
+    """Return points whose hull is a shape, shape (n, 3), where its joint has a placement [m]."""
+    place = placement * shape.placement
+    points: Array = shape_points(shape.geometry) @ place.rotation.T + place.translation
+    return points
+
+
+def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Sequence[str]) -> Foot:
+    """Return the wheel, sole or ball that the first of some links is.
+
+    The z axis of a sole's frame points up while joints are at zero. One of the other links, which
+    the same joint moves, may have such a frame.
+    """
+    frame = model.frames[model.getFrameId(links[0], pin.BODY)]
+    joint, n_joints = frame.parentJoint, len(model.supports[frame.parentJoint]) - 2
+    on_joint = [shape for shape in shapes if shape.parentJoint == joint]
+    own = [shape for shape in on_joint if _link_of(model, shape) == links[0]] or on_joint
+    if not own or n_joints < 1:
+        return Foot(links[0])
+    straight = model.createData()
+    pin.framesForwardKinematics(model, straight, clamp_to_limits(model, pin.neutral(model)))
+    foot = _wheel(model, frame, own) if model.nqs[joint] == 2 else None
+    if foot is not None:
+        return foot
+    world = data.oMi[joint]
+    for link in links if n_joints >= _SOLE_JOINTS else ():
+        link_frame = model.getFrameId(link, pin.BODY)
+        if straight.oMf[link_frame].rotation[2, 2] > _MIN_UPRIGHT:
+            corners = _sole(model.frames[link_frame].placement.inverse(), own)
+            if corners is not None:
+                return Foot(link, corners=corners)
+    lowest = min(own, key=lambda shape: float(_points(world, shape)[:, 2].min()))
+    return _ball(frame, world, lowest)
+
+
+def _wheel(model: pin.Model, frame: pin.Frame, shapes: list[Any]) -> Foot | None:
+    """Return the ball with the radius of a wheel, or None if a link does not surround its axis."""
+    joint, data = frame.parentJoint, model.createData()
+    axis = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
+    axis = axis[3:, model.idx_vs[joint]]
+    points = np.vstack([_points(pin.SE3.Identity(), shape) for shape in shapes])
+    along = points @ axis
+    across = points - np.outer(along, axis)
+    radius = float(np.linalg.norm(across, axis=1).max())
+    eccentricity = np.linalg.norm(0.5 * (across.min(axis=0) + across.max(axis=0)))
+    if eccentricity > _MAX_ECCENTRICITY * radius:
+        return None
+    centre = frame.placement.actInv(0.5 * (along.min() + along.max()) * axis)
+    return Foot(str(frame.name), round(radius, _DIGITS), centre.round(_DIGITS))
+
+
+def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
+    """Return up to four corners of the lowest part of shapes, or None if that part is small.
+
+    `placement` is that of the joint in the frame of the sole.
+    """
+    points = np.vstack(
+        [
+            [placement.act(shape.placement.translation) - [0.0, 0.0, shape.geometry.radius]]
+            if isinstance(shape.geometry, coal.Sphere)
+            else _points(placement, shape)
+            for shape in shapes
+        ]
+    )
+    size, bottom = np.ptp(points[:, :2], axis=0), points[:, 2].min()
+    sole = points[points[:, 2] < bottom + _SOLE_DEPTH * size.max()]
+    if len(sole) < 3 or np.any(np.ptp(sole[:, :2], axis=0) < _MIN_SOLE * size) or not size.all():
+        return None
+    # the corners farthest to the front left, front right, rear right and rear left
+    farthest = [int(np.argmax(sole[:, :2] @ (sign / size))) for sign in _DIAGONALS]
+    farthest = list(dict.fromkeys(farthest))
+    if len(farthest) < 3:
+        return None
+    corners = np.column_stack([sole[farthest, :2], np.full(len(farthest), bottom)])
+    return np.asarray(corners.round(_DIGITS))
+
+
+def _ball(frame: pin.Frame, world: pin.SE3, shape: Any) -> Foot:
+    """Return the ball at the lowest end of a shape of a link."""
+    if isinstance(shape.geometry, coal.Sphere):
+        radius, centre = shape.geometry.radius, shape.placement.translation
+    else:
+        points = _points(world, shape)
+        size, bottom = np.ptp(points, axis=0), points[:, 2].min()
+        radius = 0.5 * size.min()
+        low = points[points[:, 2] < bottom + _SOLE_DEPTH * size.max()].mean(axis=0)
+        centre = world.actInv(np.array([*low[:2], bottom + radius]))
+    centre = frame.placement.actInv(np.array(centre).ravel())
+    return Foot(str(frame.name), round(float(radius), _DIGITS), centre.round(_DIGITS))
