@@ -5,7 +5,7 @@ Each message says what is wrong, what is expected, and what to do.
 
 from __future__ import annotations
 
-import sys
+import inspect
 import warnings
 from collections.abc import Iterable
 from contextlib import suppress
@@ -112,8 +112,8 @@ def require(module: str, extra: str) -> ModuleType:
 
 def warn(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the code that called the package."""
-    frame, level = sys._getframe(), 1
-    while frame.f_back is not None and frame.f_globals["__name__"].startswith("floatbase."):
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals["__name__"].startswith("floatbase."):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, category, stacklevel=level)
 

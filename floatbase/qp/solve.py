@@ -35,9 +35,10 @@ _MAX_POLISHING_STEP = 1e-4
 _RANK_TOLERANCE = 1e-12  # of a singular system of optimality conditions, relative
 _ROUNDING = 1e-14  # fraction of the terms of a slope that may be rounding
 _STATIONARITY = 1e-12  # fraction of its largest term that the slope at an optimum may have
-# of the distance from the last point, which DAQP adds to an objective without curvature in some
-# direction, relative to the largest curvature: a larger one takes thousands of iterations
-_PROXIMAL_WEIGHT = 1e-6
+# of the distance from the last point, which DAQP adds to the objective, relative to the largest
+# curvature. The first is for an objective without curvature in some direction; larger ones can take
+# thousands of iterations. The others are for problems in which DAQP cycles with the first
+_PROXIMAL_WEIGHTS = -1e-6, 1e-5, 1e-4
 # DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
 # 4 s on a loaded machine, and it was never seen to need more than 155
 _DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
@@ -197,8 +198,7 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
         only = _polished(qp, np.zeros(0), np.zeros(rows))
         return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
-    # proximal steps in all directions are slower, but do not cycle where weights are far apart
-    for proximal_weight in (-_PROXIMAL_WEIGHT, _PROXIMAL_WEIGHT):  # < 0: only without curvature
+    for proximal_weight in _PROXIMAL_WEIGHTS:  # a negative one: only if curvature is missing
         y, _, exit_flag, info = daqp.solve(
             reduced.H / scale,
             reduced.g / scale,
