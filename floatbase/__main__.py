@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import floatbase as fb
-from floatbase.robots import file_loader
 
 if TYPE_CHECKING:
     from floatbase.playground import Playground
@@ -178,14 +177,11 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
         "foot_radius": options.foot_radius,
         "posture": _posture(options.posture),
     }
-    load_file = file_loader(options.robot)
-    if load_file is None:
-        return fb.load(options.robot, **described)
     if options.fixed:
         described["floating"] = False
     if options.package_dirs:
         described["package_dirs"] = options.package_dirs
-    return load_file(options.robot, **described)
+    return fb.load(options.robot, **described)
 
 
 def _posture(entries: Sequence[str]) -> dict[str, float] | None:

@@ -71,8 +71,9 @@ def load(
     torque_limits: npt.ArrayLike | None = None,
     posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
+    **file_options: Any,
 ) -> Robot:
-    """Load a robot by name.
+    """Load a robot by name, or from a file.
 
     Parameters
     ----------
@@ -90,11 +91,13 @@ def load(
     posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. By
         default the one that comes with the robot, with its joints brought within their limits. A
-        mapping changes joints of that posture [rad or m]; a * in a name stands for any characters,
-        as in {"*_knee": 0.6}.
+        mapping changes joints of that posture [rad or m]; an asterisk in a name stands for any
+        characters, as in ``{"*_knee": 0.6}``.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
         and τ.
+    **file_options
+        Other arguments of `load_urdf` or `load_mjcf`, if `name` is a path.
 
     Returns
     -------
@@ -124,7 +127,7 @@ def load(
     import example_robot_data as data
 
     name = str(name) if isinstance(name, Path) else name
-    load_file = file_loader(name)
+    load_file = _file_loader(name)
     if load_file is not None:
         return load_file(
             name,
@@ -133,6 +136,11 @@ def load(
             torque_limits=torque_limits,
             posture=posture,
             locked=locked,
+            **file_options,
+        )
+    if file_options:
+        raise InputError(
+            f"{', '.join(file_options)}: only robots from a file have these options, not {name}."
         )
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
@@ -166,19 +174,8 @@ def load(
     return _checked(robot, feet)
 
 
-def file_loader(path: str) -> Callable[..., Robot] | None:
-    """Choose the function that loads a robot's file, according to its outermost element.
-
-    Parameters
-    ----------
-    path : str
-        Path of a file, or the name of a robot.
-
-    Returns
-    -------
-    callable or None
-        `load_urdf` or `load_mjcf`; None unless the path ends like a URDF or MJCF file.
-    """
+def _file_loader(path: str) -> Callable[..., Robot] | None:
+    """Return the function that loads a file of this name and content; None for a robot's name."""
     endings = *_FILE_ENDINGS, ".xacro", ".sdf"  # of these, load_urdf says what to run first
     if not isinstance(path, str) or not path.lower().endswith(endings):
         return None
@@ -226,9 +223,10 @@ def load_urdf(
         Torque limits [N·m]; by default those of the URDF.
     posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. A mapping
-        holds some joints [rad or m]; a * in a name stands for any characters, as in {"*_knee":
-        0.6}, and later entries take precedence. Other joints are at zero, or at the limit nearest
-        to zero. By default all joints are, except that legs which would be straight are bent.
+        holds some joints [rad or m]; an asterisk in a name stands for any characters, as in
+        ``{"*_knee": 0.6}``, and later entries take precedence. Other joints are at zero, or at the
+        limit nearest to zero. By default all joints are, except that legs which would be straight
+        are bent.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
