@@ -39,11 +39,13 @@ from floatbase.robots.plausibility import (
 )
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
-    check_couplings,
+    Coupling,
     check_model,
     normalize_urdf,
     parse_urdf,
+    read_couplings,
     read_text,
+    with_followers_placed,
     with_locked_joints,
 )
 
@@ -106,15 +108,22 @@ def load(
     UnknownNameError
         If there is no robot, frame or joint with a given name; the message lists similar names.
     InputError
-        If the feet, limits or posture do not fit the robot, if joints are coupled by <mimic>, or if
-        the robot's inertia matrix M is singular.
+        If the feet, limits or posture do not fit the robot, if coupled joints follow each other, or
+        if the robot's inertia matrix M is singular.
 
     Warns
     -----
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres.
+        are not in metres. Also if joints are coupled: a joint that follows another joint by
+        <mimic>, and its leader, are locked in the posture.
+
+    Notes
+    -----
+    In the posture, the positions of followers are those that their leaders require. If `locked`
+    names all followers of a leader, the leader itself remains free. Its followers are then locked,
+    unlike those of the real robot.
 
     Examples
     --------
@@ -250,8 +259,9 @@ def load_urdf(
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres. Also if mesh files are missing, if only some joints have a torque limit,
-        or if the URDF has settings for MuJoCo, which are ignored.
+        are not in metres. Also if joints are coupled, as in `load`, if mesh files are missing, if
+        only some joints have a torque limit, or if the URDF has settings for MuJoCo, which are
+        ignored.
 
     Notes
     -----
@@ -355,7 +365,8 @@ def load_mjcf(
     -----
     RobotWarning
         If the file contains parts that the robot does not have, such as tendons, springs,
-        constraints and other free bodies, or for the same reasons as in `load_urdf`.
+        constraints and other free bodies, or for the same reasons as in `load_urdf`. A linear
+        equality constraint between two joints couples them like <mimic> in a URDF.
     """
     from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
 
@@ -412,14 +423,17 @@ def _make_robot(
 ) -> Robot:
     """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
     locked, floating = as_strings("locked", locked), has_floating_base(model)
-    if locked:
+    joints = list(model.names)[2 if floating else 1 :]
+    for joint in locked:
+        if joint not in joints:
+            raise unknown_name(
+                f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
+            )
+    couplings = read_couplings(urdf)
+    if locked or couplings:
         full_model, q = model, as_posture(name, model, posture)
-        joints = list(full_model.names)[2 if floating else 1 :]
-        for joint in locked:
-            if joint not in joints:
-                raise unknown_name(
-                    f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
-                )
+        q = with_followers_placed(name, model, q, couplings)
+        locked = (*locked, *_lock_coupled_joints(name, joints, couplings, locked))
         urdf = with_locked_joints(urdf, full_model, q, locked)
         model = parse_urdf(name, urdf, floating)
         kept_joints = [
@@ -429,7 +443,6 @@ def _make_robot(
         model.armature = np.array(
             [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
         )
-    check_couplings(name, urdf)
     check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
@@ -437,6 +450,27 @@ def _make_robot(
     posture = as_posture(name, model, posture)
     feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
     return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
+
+
+def _lock_coupled_joints(
+    name: str, joints: Sequence[str], couplings: Mapping[str, Coupling], locked: Sequence[str]
+) -> list[str]:
+    """Return further joints to lock, with a warning: unlocked followers and their leaders."""
+    leaders = {joint: c.leader for joint, c in couplings.items() if joint not in locked}
+    coupled = [joint for joint in joints if joint in {*leaders, *leaders.values()} - {*locked}]
+    if coupled:
+        follower, leader = next(iter(leaders.items()))
+        still = sorted({*leaders.values()} - {*joints})
+        message = (
+            f"Joints of {name} are coupled, such as {follower} to {leader}. Eqs. (1)-(7) need a "
+            f"separate motor for every joint, so these are locked at their positions in the "
+            f"posture: {', '.join(coupled)}. "
+            + (f"Some leaders are fixed or do not exist: {', '.join(still)}. " if still else "")
+            + f"To lock only the followers, pass locked={list(leaders)}. If every joint has a "
+            f"motor, remove the couplings from the file."
+        )
+        warn(message, RobotWarning)
+    return coupled
 
 
 def _checked(
