@@ -463,8 +463,8 @@ def _lock_coupled_joints(
         still = sorted({*leaders.values()} - {*joints})
         message = (
             f"Joints of {name} are coupled, such as {follower} to {leader}. Eqs. (1)-(7) need a "
-            f"separate motor for every joint, so these are locked at their positions in the "
-            f"posture: {', '.join(coupled)}. "
+            f"separate motor for every joint, so these are locked in the posture, with followers "
+            f"where their leaders put them: {', '.join(coupled)}. "
             + (f"Some leaders are fixed or do not exist: {', '.join(still)}. " if still else "")
             + f"To lock only the followers, pass locked={list(leaders)}. If every joint has a "
             f"motor, remove the couplings from the file."

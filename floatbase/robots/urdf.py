@@ -248,6 +248,12 @@ def _normalize_joint(name: str, joint: Element) -> None:
             for element in joint.findall(tag):
                 joint.remove(element)
         return
+    mimic = joint.find("mimic")
+    if mimic is not None and not mimic.get("joint"):
+        raise InputError(
+            f"<mimic> of joint {label!r} of {name} names no joint. Add the joint that it follows, "
+            f'as in joint="finger".'
+        )
     axis = joint.find("axis")
     if axis is None:
         axis = ElementTree.SubElement(joint, "axis")

@@ -194,9 +194,7 @@ FOLLOW = '<mimic joint="j0" multiplier="-2" offset="0.3"/>'
         (fingers("", FOLLOW.replace("j0", "gone"), ""), None, {"j1": 0.3}),
     ],
 )  # fmt: skip
-def test_coupled_joints_are_locked_together_where_the_leader_puts_the_followers(
-    urdf, posture, places
-):
+def test_coupled_joints_are_locked_where_their_leader_puts_them(urdf, posture, places):
     with warns(RobotWarning, *places):
         robot = fb.load_urdf(urdf, posture=posture, feet=[])
     alone = re.sub("<mimic.*?>", "", urdf)
@@ -229,6 +227,7 @@ def test_a_leader_moves_alone_only_if_its_followers_are_locked_by_name():
         (two_links().replace('"base"', '"a"').replace('"top"', '"base"'), ("link", "base")),
         (two_links(joint="root_joint"), ("joint", "root_joint")),
         (fingers("", '<mimic joint="j2"/>', '<mimic joint="j1"/>'), ("j1", "j2", "mimic")),
+        (two_links(extra=LIMIT + "<mimic/>"), ("elbow", "mimic", "joint")),
         (two_links(mass=0, iyy=0), ("M", "elbow", "locked")),
         (two_links(extra=LIMIT + "<xacro:a/>"), ("URDF", "xacro")),
         (two_links(extra=""), ("elbow", "limit")),
