@@ -23,13 +23,9 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
-from floatbase.robots._checks import (
-    as_posture,
-    clamp_to_limits,
-    has_floating_base,
-    with_angles,
-)
+from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
+from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
 from floatbase.robots.feet import as_feet, with_bent_legs
 from floatbase.robots.plausibility import (
     missing_meshes_message,
@@ -39,13 +35,10 @@ from floatbase.robots.plausibility import (
 )
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
-    Coupling,
     check_model,
     normalize_urdf,
     parse_urdf,
-    read_couplings,
     read_text,
-    with_followers_placed,
     with_locked_joints,
 )
 
@@ -433,7 +426,7 @@ def _make_robot(
     if locked or couplings:
         full_model, q = model, as_posture(name, model, posture)
         q = with_followers_placed(name, model, q, couplings)
-        locked = (*locked, *_lock_coupled_joints(name, joints, couplings, locked))
+        locked = (*locked, *lock_coupled_joints(name, joints, couplings, locked))
         urdf = with_locked_joints(urdf, full_model, q, locked)
         model = parse_urdf(name, urdf, floating)
         kept_joints = [
@@ -450,27 +443,6 @@ def _make_robot(
     posture = as_posture(name, model, posture)
     feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
     return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
-
-
-def _lock_coupled_joints(
-    name: str, joints: Sequence[str], couplings: Mapping[str, Coupling], locked: Sequence[str]
-) -> list[str]:
-    """Return further joints to lock, with a warning: unlocked followers and their leaders."""
-    leaders = {joint: c.leader for joint, c in couplings.items() if joint not in locked}
-    coupled = [joint for joint in joints if joint in {*leaders, *leaders.values()} - {*locked}]
-    if coupled:
-        follower, leader = next(iter(leaders.items()))
-        still = sorted({*leaders.values()} - {*joints})
-        message = (
-            f"Joints of {name} are coupled, such as {follower} to {leader}. Eqs. (1)-(7) need a "
-            f"separate motor for every joint, so these are locked in the posture, with followers "
-            f"where their leaders put them: {', '.join(coupled)}. "
-            + (f"Some leaders are fixed or do not exist: {', '.join(still)}. " if still else "")
-            + f"To lock only the followers, pass locked={list(leaders)}. If every joint has a "
-            f"motor, remove the couplings from the file."
-        )
-        warn(message, RobotWarning)
-    return coupled
 
 
 def _checked(

@@ -6,17 +6,15 @@ import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
 import pinocchio as pin
 
 from floatbase._files import read_file
 from floatbase._validation import Array, short_repr
 from floatbase.errors import InputError, RobotWarning, warn
-from floatbase.robots._checks import has_floating_base, with_angles
+from floatbase.robots._checks import has_floating_base
 from floatbase.robots.inertia import read_inertia, read_numbers
 
 Element = ElementTree.Element
@@ -363,54 +361,6 @@ def _check_reserved_names(name: str, model: pin.Model) -> None:
             f"A joint of {name} has the name root_joint, which Pinocchio uses for the joint of a "
             f"floating base. Rename it."
         )
-
-
-class Coupling(NamedTuple):
-    """The position of a joint as multiplier × the position of its leader + offset."""
-
-    leader: str
-    multiplier: float
-    offset: float  # rad or m
-
-
-def read_couplings(urdf: str) -> dict[str, Coupling]:
-    """Return the coupling of each joint that follows another joint by <mimic>."""
-    return {
-        joint.get("name", ""): Coupling(
-            mimic.get("joint", ""),
-            float(mimic.get("multiplier", "1")),
-            float(mimic.get("offset", "0")),
-        )
-        for joint in ElementTree.fromstring(urdf).findall("joint")
-        for mimic in joint.findall("mimic")
-    }
-
-
-def with_followers_placed(
-    name: str, model: pin.Model, q: Array, couplings: Mapping[str, Coupling]
-) -> Array:
-    """Return a configuration with each follower where its leader puts it.
-
-    A leader that does not move or does not exist is at zero.
-    """
-
-    def position(joint: str, followers: tuple[str, ...] = ()) -> float:
-        if joint in followers:
-            raise InputError(
-                f"Coupled joints of {name} follow each other: {', '.join(followers)}. Remove "
-                f"<mimic>, or the equality constraint of an MJCF, from one of them."
-            )
-        if joint in couplings:
-            leader, multiplier, offset = couplings[joint]
-            return multiplier * position(leader, (*followers, joint)) + offset
-        if not model.existJointName(joint):
-            return 0.0
-        entry = model.idx_qs[model.getJointId(joint)]
-        has_limits = model.nqs[model.getJointId(joint)] == 1
-        return float(q[entry] if has_limits else np.arctan2(q[entry + 1], q[entry]))
-
-    angles = {joint: position(joint) for joint in couplings}
-    return np.asarray(with_angles(name, model, q, angles))
 
 
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:
