@@ -23,13 +23,9 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
-from floatbase.robots._checks import (
-    as_posture,
-    clamp_to_limits,
-    has_floating_base,
-    with_angles,
-)
+from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
+from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
 from floatbase.robots.feet import as_feet, with_bent_legs
 from floatbase.robots.plausibility import (
     missing_meshes_message,
@@ -39,7 +35,6 @@ from floatbase.robots.plausibility import (
 )
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
-    check_couplings,
     check_model,
     normalize_urdf,
     parse_urdf,
@@ -109,15 +104,22 @@ def load(
     UnknownNameError
         If there is no robot, frame or joint with a given name; the message lists similar names.
     InputError
-        If the feet, limits or posture do not fit the robot, if joints are coupled by <mimic>, or if
-        the robot's inertia matrix M is singular.
+        If the feet, limits or posture do not fit the robot, if coupled joints follow each other, or
+        if the robot's inertia matrix M is singular.
 
     Warns
     -----
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres.
+        are not in metres. Also if joints are coupled: a joint that follows another joint by
+        <mimic>, and its leader, are locked in the posture.
+
+    Notes
+    -----
+    In the posture, the positions of followers are those that their leaders require. If `locked`
+    names all followers of a leader, the leader itself remains free. Its followers are then locked,
+    unlike those of the real robot.
 
     Examples
     --------
@@ -248,8 +250,9 @@ def load_urdf(
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres. Also if mesh files are missing, if only some joints have a torque limit,
-        or if the URDF has settings for MuJoCo, which are ignored.
+        are not in metres. Also if joints are coupled, as in `load`, if mesh files are missing, if
+        only some joints have a torque limit, or if the URDF has settings for MuJoCo, which are
+        ignored.
 
     Notes
     -----
@@ -353,7 +356,8 @@ def load_mjcf(
     -----
     RobotWarning
         If the file contains parts that the robot does not have, such as tendons, springs,
-        constraints and other free bodies, or for the same reasons as in `load_urdf`.
+        constraints and other free bodies, or for the same reasons as in `load_urdf`. A linear
+        equality constraint between two joints couples them like <mimic> in a URDF.
     """
     from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
 
@@ -410,14 +414,17 @@ def _make_robot(
 ) -> Robot:
     """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
     locked, floating = as_strings("locked", locked), has_floating_base(model)
-    if locked:
+    joints = list(model.names)[2 if floating else 1 :]
+    for joint in locked:
+        if joint not in joints:
+            raise unknown_name(
+                f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
+            )
+    couplings = read_couplings(urdf)
+    if locked or couplings:
         full_model, q = model, as_posture(name, model, posture)
-        joints = list(full_model.names)[2 if floating else 1 :]
-        for joint in locked:
-            if joint not in joints:
-                raise unknown_name(
-                    f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
-                )
+        q = with_followers_placed(name, model, q, couplings)
+        locked = (*locked, *lock_coupled_joints(name, joints, couplings, locked))
         urdf = with_locked_joints(urdf, full_model, q, locked)
         model = parse_urdf(name, urdf, floating)
         kept_joints = [
@@ -427,7 +434,6 @@ def _make_robot(
         model.armature = np.array(
             [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
         )
-    check_couplings(name, urdf)
     check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]

@@ -129,6 +129,7 @@ class _Writer:
         self._bodies = bodies
         moved = enumerate(model.jnt_bodyid.tolist())
         self.joints = [joint for joint, b in moved if b in bodies and b != self.root]
+        self._couplings = self._find_couplings()
         self._links, self._joint_elements = dict[str, str](), dict[str, str]()  # by name
 
     def _find_root(self, floating: bool) -> int:
@@ -149,6 +150,28 @@ class _Writer:
     def _is_of_robot(self, root: int) -> bool:
         """Return whether the bodies below a child of the world belong to the robot."""
         return bool(root == self.root if self.root else root not in self.free)
+
+    def _find_couplings(self) -> dict[int, int]:
+        """Return the joints whose positions are linear in that of a joint, and the constraints."""
+        model, couplings = self._model, dict[int, int]()
+        is_coupling = (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (model.eq_active0 != 0)
+        is_coupling &= ~model.eq_data[:, 2:5].any(axis=1)
+        is_coupling &= np.isin(model.eq_obj1id, self.joints) & np.isin(model.eq_obj2id, self.joints)
+        for constraint in np.flatnonzero(is_coupling).tolist():
+            couplings.setdefault(int(model.eq_obj1id[constraint]), constraint)
+        return couplings
+
+    def _mimic(self, joint: int) -> str:
+        """Write the coupling of a joint to its leader, if it has one."""
+        if joint not in self._couplings:
+            return ""
+        model, constraint = self._model, self._couplings[joint]
+        leader, (constant, slope) = model.eq_obj2id[constraint], model.eq_data[constraint, :2]
+        rest, leader_rest = model.qpos0[model.jnt_qposadr[[joint, leader]]]
+        return (
+            f"<mimic joint={quoteattr(self.label('joint', leader))} multiplier='{_text(slope)}' "
+            f"offset='{_text(rest + constant - slope * leader_rest)}'/>"
+        )
 
     def label(self, kind: str, number: int) -> str:
         """Return the name of a body, joint, geom, …, or one made from its number."""
@@ -229,7 +252,7 @@ class _Writer:
             f"<axis xyz='{_text(model.jnt_axis[joint])}'/><limit lower='{_text(lower)}' "
             f"upper='{_text(upper)}' effort='{_text(self._largest_torque(joint))}' velocity='0'/>"
             f"<dynamics damping='{_text(model.dof_damping[dof])}' "
-            f"friction='{_text(model.dof_frictionloss[dof])}'/>"
+            f"friction='{_text(model.dof_frictionloss[dof])}'/>{self._mimic(joint)}"
         )
         kind_name = "continuous" if is_hinge and not limited else _JOINT_TYPES[kind]
         self._add_joint(name, kind_name, parent, child, place, rest)
@@ -356,11 +379,13 @@ class _Writer:
         surroundings = f"gravity {_text(gravity)}, density {option.density:g}"
         roots = sorted(set(model.body_rootid[model.jnt_bodyid].tolist()))
         others = [root for root in roots if not self._is_of_robot(root)]
-        passive = [joint for joint in self.joints if not self._motors(joint)]
+        constraints = list(self._couplings.values())
+        coupled = {*self._couplings, *model.eq_obj2id[constraints].tolist()}  # they are locked
+        passive = [j for j in self.joints if j not in coupled and not self._motors(j)]
         differences = {
             "without meshes whose file is missing": missing,
             "without equality constraints": self._labels(
-                "equality", np.flatnonzero(model.eq_active0).tolist()
+                "equality", sorted({*np.flatnonzero(model.eq_active0).tolist()} - {*constraints})
             ),
             "without tendons": self._labels("tendon", range(model.ntendon)),
             "without other moving bodies": self._labels("body", others),

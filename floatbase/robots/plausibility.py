@@ -46,7 +46,7 @@ def straight_legs_message(robot: Robot) -> str:
         f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
         f"The legs of {', '.join(straight)} are then singular, for example straight, and "
         f"cannot move their feet in all directions. Pass a posture with bent legs, such as "
-        f'posture={{"name of a knee": 0.6}}, or {robot.nq - 7} joint positions.'
+        f'posture={{"name of a knee": 0.6}}, or the positions of all joints.'
     )
 
 

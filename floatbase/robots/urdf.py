@@ -246,6 +246,12 @@ def _normalize_joint(name: str, joint: Element) -> None:
             for element in joint.findall(tag):
                 joint.remove(element)
         return
+    mimic = joint.find("mimic")
+    if mimic is not None and not mimic.get("joint"):
+        raise InputError(
+            f"<mimic> of joint {label!r} of {name} names no joint. Add the joint that it follows, "
+            f'as in joint="finger".'
+        )
     axis = joint.find("axis")
     if axis is None:
         axis = ElementTree.SubElement(joint, "axis")
@@ -354,25 +360,6 @@ def _check_reserved_names(name: str, model: pin.Model) -> None:
         raise InputError(
             f"A joint of {name} has the name root_joint, which Pinocchio uses for the joint of a "
             f"floating base. Rename it."
-        )
-
-
-def check_couplings(name: str, urdf: str) -> None:
-    """Check that no joint mimics another joint."""
-    joints = ElementTree.fromstring(urdf).findall("joint")
-    names = [joint.get("name", "") for joint in joints if joint.get("type") != "fixed"]
-    masters = {
-        joint.get("name", ""): mimic.get("joint", "")
-        for joint in joints
-        for mimic in joint.findall("mimic")
-    }
-    if masters:
-        joint, master = next(iter(masters.items()))
-        coupled = [joint for joint in names if joint in masters or joint in masters.values()]
-        raise InputError(
-            f"Joints of {name} are coupled by <mimic>, such as {joint} to {master}. Eqs. (1)-(7) "
-            f"need a separate motor for every joint. Lock these joints with locked={coupled}, or "
-            f"remove <mimic> from the URDF if they do have separate motors."
         )
 
 

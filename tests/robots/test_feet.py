@@ -126,7 +126,7 @@ def test_straight_legs_are_bent_as_far_as_their_limits_allow(knee, kind, sign):
 
 
 def test_legs_that_cannot_bend_are_reported():
-    with warns(RobotWarning, "posture", "L_foot", 12):
+    with warns(RobotWarning, "posture", "L_foot"):
         fb.load_urdf(biped(BALLS, 'lower="0" upper="0.01"'))
 
 

@@ -207,6 +207,29 @@ def test_what_the_robot_does_not_have_is_named(load, mjcf, named):
         load(pendulum())
 
 
+def test_joints_that_an_equality_couples_are_locked_as_in_mujoco(load):
+    """MuJoCo measures a coupling from the initial configuration, which `ref` sets."""
+    mjcf = """<mujoco><compiler angle="radian"/><worldbody><body><joint name="a" ref="0.3"/>
+      <geom size="0.1"/><body pos="1 0 0"><joint name="b" axis="1 0 0" ref="-0.2"/>
+      <geom size="0.1"/><body name="tip" pos="0 1 0"><joint name="c"/><geom size="0.1"/>
+      </body></body></body></worldbody>
+      <equality><joint joint1="b" joint2="a" polycoef="0.1 -2 {} 0 0"/></equality></mujoco>"""
+    with warns(RobotWarning, "a", "b", "locked"):
+        robot = load(mjcf.format(0), posture={"a": 0.5})
+    model = mujoco.MjModel.from_xml_string(mjcf.format(0))
+    data = mujoco.MjData(model)
+    data.qpos = [0.5, 0.0, 0.0]
+    mujoco.mj_forward(model, data)
+    data.qpos[1] -= data.efc_pos[0]
+    mujoco.mj_forward(model, data)
+    tip = robot.standing().frame_pose("tip")
+    assert abs(data.efc_pos[0]) < 1e-12 and robot.joint_names == ("c",)
+    assert np.allclose(tip.translation, data.body("tip").xpos)
+    assert np.allclose(tip.rotation.ravel(), data.body("tip").xmat)
+    with warns(RobotWarning, "equality_0"):  # it is not linear
+        assert load(mjcf.format(1)).d == 3
+
+
 def test_an_arm_keeps_its_rotor_inertias_when_it_is_locked_or_set_free(load):
     arm = f"""<mujoco><worldbody><body name="foot"><geom size="0.1"/>
       {4 * '<body pos="0 0 1"><joint axis="0 1 0" armature="0.3"/><geom size="0.1"/>'}
