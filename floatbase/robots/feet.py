@@ -224,13 +224,16 @@ def _link_of(model: pin.Model, shape: Any) -> str:
 def _shapes_of(
     model: pin.Model, urdf: str, folders: Sequence[Path], joints: Sequence[int]
 ) -> list[Any]:
-    """Return the shapes of the links that joints move, without stand-ins for missing meshes."""
+    """Return the shapes of the links that joints move, without stand-ins for missing meshes.
+
+    A shape without a size marks a place, and nothing touches it.
+    """
     links = {link for joint in joints for link in _links_of(model, joint)}
     shapes, incomplete = link_shapes(model, urdf, folders, links=links)
     return [
         shape
         for shape in shapes
-        if _link_of(model, shape) not in incomplete and len(shape_points(shape.geometry))
+        if _link_of(model, shape) not in incomplete and shape_points(shape.geometry).any()
     ]
 
 

@@ -136,6 +136,8 @@ def test_a_biped_on_points_is_reported():
         fb.load_urdf(biped(""))
     with warns(RobotWarning, "L_foot", "corners", 2):
         fb.load_urdf(biped(BALLS), feet=["L_foot", "R_foot"], foot_radius=0.02)
+    with warns(RobotWarning, "L_foot", 2):  # a box without a size marks a place
+        fb.load_urdf(biped('<collision><geometry><box size="0 0 0"/></geometry></collision>'))
 
 
 @pytest.mark.parametrize("kind", ["continuous", "revolute"])  # here revolute joints have no limits
