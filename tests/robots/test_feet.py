@@ -155,10 +155,7 @@ def test_a_wheel_has_its_radius_and_its_axle_and_a_driven_ball_stays_a_ball(kind
     for foot in robot.feet:
         assert foot.radius == pytest.approx(0.08, abs=1e-5)
         assert np.allclose(foot.centre, [0.0, 0.02, 0.0], atol=1e-5)
-        is_wheel = shape.startswith("cylinder")
-        assert (None if foot.axis is None else foot.axis.tolist()) == (
-            [0.0, 1.0, 0.0] if is_wheel else None
-        )
+        assert str(foot.axis) == ("[0. 1. 0.]" if shape.startswith("cylinder") else "None")
 
 
 def test_arms_and_robots_without_limbs_have_no_feet_and_feet_can_be_declined():
