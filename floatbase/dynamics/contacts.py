@@ -21,6 +21,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
+from floatbase.dynamics.constraints import RollingWheel
 from floatbase.dynamics.contact import (
     DEFAULT_MU,
     UP,
@@ -104,7 +105,8 @@ class Contacts(Value):
     ) -> Contacts:
         """Make point contacts at the robot's feet or at other frames.
 
-        A flat foot touches the ground at the middle of its corners; `flat_feet` uses its area.
+        A flat foot touches the ground at the middle of its corners; `flat_feet` uses its area. A
+        wheel touches it at its lowest point, as a `floatbase.dynamics.RollingWheel`.
 
         Parameters
         ----------
@@ -122,7 +124,7 @@ class Contacts(Value):
         Returns
         -------
         Contacts
-            One point contact for each frame.
+            One contact for each frame, with one point.
 
         Raises
         ------
@@ -180,7 +182,7 @@ class Contacts(Value):
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """Make contacts of all feet: flat feet with their corners, other feet as points.
+        """Make contacts of all feet: flat feet with their corners, wheels that roll, and points.
 
         Parameters
         ----------
@@ -523,7 +525,9 @@ def constraint_and_jacobian(
 
 
 def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
-    """Make the contact of a foot: a point if it has no corners or `flat` is False."""
+    """Make the contact of a foot: a wheel, a sole if `flat` is True, or else a point."""
+    if foot.axis is not None:
+        return RollingWheel(foot.frame, foot.axis, foot.radius, normal, mu, foot.centre)
     if flat and foot.is_flat:
         return FlatFootContact(foot.frame, foot.points, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)

@@ -24,7 +24,8 @@ _SOLE_JOINTS = 5
 _MIN_UPRIGHT = 0.9  # vertical component of the z axis of a frame in which a sole can be given
 _SOLE_DEPTH = 0.02  # of a foot's size: points that are higher above the lowest one do not touch
 _MIN_SOLE = 0.4  # least length and width of a sole, relative to those of the foot
-_MAX_ECCENTRICITY = 0.25  # of a wheel: distance of its middle from its axis, relative to its radius
+_MIN_ROUNDNESS = 0.75  # of a wheel: how far it extends in any direction, relative to its radius
+_CIRCLE = np.exp(2j * np.pi * np.arange(24) / 24).view(float).reshape(-1, 2)  # directions
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
@@ -223,13 +224,16 @@ def _link_of(model: pin.Model, shape: Any) -> str:
 def _shapes_of(
     model: pin.Model, urdf: str, folders: Sequence[Path], joints: Sequence[int]
 ) -> list[Any]:
-    """Return the shapes of the links that joints move, without stand-ins for missing meshes."""
+    """Return the shapes of the links that joints move, without stand-ins for missing meshes.
+
+    A shape without a size marks a place, and nothing touches it.
+    """
     links = {link for joint in joints for link in _links_of(model, joint)}
     shapes, incomplete = link_shapes(model, urdf, folders, links=links)
     return [
         shape
         for shape in shapes
-        if _link_of(model, shape) not in incomplete and len(shape_points(shape.geometry))
+        if _link_of(model, shape) not in incomplete and shape_points(shape.geometry).any()
     ]
 
 
@@ -254,7 +258,7 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
         return Foot(links[0])
     straight = model.createData()
     pin.framesForwardKinematics(model, straight, clamp_to_limits(model, pin.neutral(model)))
-    foot = _wheel(model, frame, own) if model.nqs[joint] == 2 else None
+    foot = _wheel(model, frame, own) if _turns_freely(model, joint) else None
     if foot is not None:
         return foot
     world = data.oMi[joint]
@@ -268,20 +272,28 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
     return _ball(frame, world, lowest)
 
 
+def _turns_freely(model: pin.Model, joint: int) -> bool:
+    """Return whether a joint can make a whole turn."""
+    joints, _, lower, upper = joint_limits(model)
+    is_angle = model.joints[joint].shortname().startswith("JointModelR")
+    return bool(is_angle and np.all((upper - lower)[joints == joint] >= 2.0 * np.pi))
+
+
 def _wheel(model: pin.Model, frame: pin.Frame, shapes: list[Any]) -> Foot | None:
-    """Return the ball with the radius of a wheel, or None if a link does not surround its axis."""
+    """Return the wheel or driven ball that shapes form, or None if they are not round."""
     joint, data = frame.parentJoint, model.createData()
     axis = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
     axis = axis[3:, model.idx_vs[joint]]
     points = np.vstack([_points(pin.SE3.Identity(), shape) for shape in shapes])
     along = points @ axis
-    across = points - np.outer(along, axis)
+    across = points @ np.linalg.svd(axis[None])[2][1:].T
     radius = float(np.linalg.norm(across, axis=1).max())
-    eccentricity = np.linalg.norm(0.5 * (across.min(axis=0) + across.max(axis=0)))
-    if eccentricity > _MAX_ECCENTRICITY * radius:
+    if (across @ _CIRCLE.T).max(axis=0).min() < _MIN_ROUNDNESS * radius:
         return None
     centre = frame.placement.actInv(0.5 * (along.min() + along.max()) * axis)
-    return Foot(str(frame.name), round(radius, _DIGITS), centre.round(_DIGITS))
+    is_ball = all(isinstance(shape.geometry, coal.Sphere) for shape in shapes)
+    axle = None if is_ball else (frame.placement.rotation.T @ axis).round(_DIGITS)
+    return Foot(str(frame.name), round(radius, _DIGITS), centre.round(_DIGITS), axis=axle)
 
 
 def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:

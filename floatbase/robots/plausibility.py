@@ -81,10 +81,15 @@ def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
     if is_stable or not 1 <= len(robot.feet) <= 2:
         return ""
     names = [foot.frame for foot in robot.feet]
+    advice = (
+        f"If it has soles, give their corners, as in "
+        f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+        if robot.feet[0].axis is None
+        else "Its wheels must move to balance it, which no task of floatbase does."
+    )
     return (
         f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
-        f"point(s) only: {', '.join(names)}. If it has soles, give their corners, as in "
-        f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+        f"point(s) only: {', '.join(names)}. {advice}"
     )
 
 

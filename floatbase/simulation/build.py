@@ -46,6 +46,8 @@ _PENETRATION_RECOVERY_TIME = 0.2
 _CORNER_BALL_RADIUS = 0.005
 # m: MuJoCo has no balls of radius 0, which is the radius of a foot without a size
 _MIN_BALL_RADIUS = 1e-4
+# m: half of the width of a wheel's rim, which touches the ground at one point
+_RIM_WIDTH = 1e-3
 # m: boxes of the ground have no bottom, but MuJoCo's have; nothing gets below it
 _BOX_DEPTH = 10.0
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero (mjMINVAL)
@@ -284,7 +286,7 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
 
 
 def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
-    """Add a ball for each contact point of a foot, with the contact point as its lowest point."""
+    """Add a ball or a disc for each contact point of a foot; the point is its lowest one."""
     body = spec.body(body_name(foot.frame))
     if body is None:
         raise SimulationError(
@@ -295,9 +297,12 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
     if foot.is_flat:
         centres, radius = centres + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
-        body.add_geom(
+        geom = body.add_geom(
             name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1
         )
+        if foot.axis is not None:
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [radius, radius, _RIM_WIDTH]
+            mujoco.mju_quatZ2Vec(geom.quat, np.array(foot.axis))
 
 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:

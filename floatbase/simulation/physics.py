@@ -50,10 +50,10 @@ class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each point foot one ball,
-    and each flat foot a ball at each corner. Each joint gets a torque motor with the robot's torque
-    limit and rotor inertia. Joint friction and joint damping are off, as in eqs. (1)-(7), except
-    with `joint_losses`. The joint limits of the URDF are on. Only the feet collide with the ground;
-    after a fall the links can collide with it, too (`link_collisions`).
+    each wheel a thin disc, and each flat foot a ball at each corner. Each joint gets a torque motor
+    with the robot's torque limit and rotor inertia. Joint friction and joint damping are off, as in
+    eqs. (1)-(7), except with `joint_losses`. The joint limits of the URDF are on. Only the feet
+    collide with the ground; after a fall the links can collide with it, too (`link_collisions`).
 
     Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
     copy has its own `model` and `data`.
@@ -442,7 +442,8 @@ class Simulation:
         ndarray, shape (points, 3)
             Position of each point of `point_names`, in the world frame [m].
         """
-        return self.foot_contacts.positions(self.data.geom_xpos[self.foot_contacts.geoms])
+        geoms = self.foot_contacts.geoms
+        return self.foot_contacts.positions(self.data.geom_xpos[geoms], self.data.geom_xmat[geoms])
 
     def pushed_body(self, push: Push) -> int:
         """Return MuJoCo's id of the body that a push acts on.

@@ -191,8 +191,8 @@ class Rollout(Value):
         Parameters
         ----------
         include_rolling : bool, optional
-            Whether to count the distance that a ball rolls, too: rolling moves its lowest point
-            without any sliding.
+            Whether to count the distance that a ball or a wheel rolls, too: rolling moves its
+            lowest point without any sliding.
 
         Returns
         -------
@@ -225,30 +225,27 @@ class Rollout(Value):
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
     def rolling_displacement(self) -> Array:
-        """Compute how far the ball at each contact point has rolled.
+        """Compute how far the ball or the wheel at each contact point has rolled.
 
-        The displacement is the integral of ω × radius · normal.
+        The displacement is the integral of `rolling_velocity` of the contact.
 
         Returns
         -------
         ndarray, shape (n, points, 3)
             Displacement in the world frame since the first row [m].
         """
-        arms = [
-            (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
+        rolling = [
+            getattr(contact, "radius", 0.0) > 0.0 and getattr(contact, "rolling_velocity", None)
             for contact in self.contacts.friction_contacts
             for _ in contact.point_names
         ]
-        rates = np.zeros((len(self), len(arms), 3))
-        if any(np.any(arm) for _, arm in arms):
+        rates = np.zeros((len(self), len(rolling), 3))
+        if any(rolling):
             for rate, q, v in zip(rates, self.q, self.v, strict=True):
                 state = State(self.robot, q, v)
-                rate[:] = [
-                    np.cross(state.frame_velocity(name)[3:], arm) if np.any(arm) else np.zeros(3)
-                    for name, arm in arms
-                ]
+                rate[:] = [velocity(state) if velocity else np.zeros(3) for velocity in rolling]
         steps = np.diff(self.time)[:, None, None] * (rates[1:] + rates[:-1]) / 2.0
-        return np.concatenate([np.zeros((1, len(arms), 3)), np.cumsum(steps, axis=0)])
+        return np.concatenate([np.zeros((1, len(rolling), 3)), np.cumsum(steps, axis=0)])
 
     def _check_not_empty(self) -> None:
         """Raise `InputError` if the record has no rows."""
@@ -283,7 +280,9 @@ class Recorder:
         self._joint_limits: JointLimits | None = None
         # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
+        self._geom_rotations = sim.data.geom_xmat
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
+        self._foot_rotations = np.empty((ticks, points, 9))
         self._step_actuator_forces = np.empty((ticks * substeps, sim.model.nu))
         max_contacts = sim.foot_contacts.max_contacts
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
@@ -308,6 +307,7 @@ class Recorder:
         self._time[n], self._q[n], self._v[n] = t, q, v
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
+        self._geom_rotations.take(geoms, 0, self._foot_rotations[n], "clip")
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
@@ -456,7 +456,7 @@ class Recorder:
         measured = self._mean_over_substeps(
             sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
         )
-        lowest = sim.foot_contacts.positions(self._foot_centres[:n])
+        lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             point_names = contact.point_names if isinstance(contact, FrictionContact) else ()

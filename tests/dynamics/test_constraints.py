@@ -246,7 +246,7 @@ def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart):
         q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
         state = fb.State(cart, q, rng.normal(size=cart.nv))
         normal = judges.random_normals(1, seed)[0]
-        wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal)
+        wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal, centre=[0.1, 0.2, -0.3])
         A, b = wheel.constraint(state)
         expected = -judges.derivative(lambda s, w=wheel: w.jacobian(s) @ s.v, state, state.v)
         assert np.linalg.norm(expected) > 1e-2
@@ -259,7 +259,13 @@ def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(ca
     for seed in range(10):
         q = pin.integrate(cart.model, pin.neutral(cart.model), rng.uniform(-0.8, 0.8, cart.nv))
         state = fb.State(cart, q, rng.normal(size=cart.nv))
-        wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, judges.random_normals(1, seed)[0])
+        wheel = RollingWheel(
+            "wheel",
+            [0.1, 1.0, -0.2],
+            0.17,
+            judges.random_normals(1, seed)[0],
+            centre=[0.1, 0.2, 0.3],
+        )
         touching = wheel.positions(state)[0]
         in_wheel = state.frame_pose("wheel").actInv(touching)
         velocity = judges.derivative(lambda s, p=in_wheel: s.point("wheel", p), state, state.v)

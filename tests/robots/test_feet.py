@@ -1,5 +1,6 @@
 """Feet found in a URDF, legs that are bent by default, and postures given by names of joints."""
 
+import re
 import warnings
 
 import judges
@@ -135,19 +136,18 @@ def test_a_biped_on_points_is_reported():
         fb.load_urdf(biped(""))
     with warns(RobotWarning, "L_foot", "corners", 2):
         fb.load_urdf(biped(BALLS), feet=["L_foot", "R_foot"], foot_radius=0.02)
+    with warns(RobotWarning, "L_foot", 2):  # a box without a size marks a place
+        fb.load_urdf(biped('<collision><geometry><box size="0 0 0"/></geometry></collision>'))
 
 
-def test_a_wheel_has_its_radius_and_stays_below_its_axle():
-    wheel = (
-        '<collision><origin xyz="0 0.02 0" rpy="1.5707963267948966 0 0"/><geometry>'
-        '<cylinder radius="0.08" length="0.03"/></geometry></collision>'
+@pytest.mark.parametrize("kind", ["continuous", "revolute"])  # here revolute joints have no limits
+@pytest.mark.parametrize("shape", ['cylinder radius="0.08" length="0.03"', 'sphere radius="0.08"'])
+def test_a_wheel_has_its_radius_and_its_axle_and_a_driven_ball_stays_a_ball(kind, shape):
+    urdf = biped(
+        f'<collision><origin xyz="0 0.02 0" rpy="1.5707963267948966 0 0"/><geometry><{shape}/>'
+        f"</geometry></collision>"
     )
-    urdf = biped(wheel)
-    for side in "LR":
-        urdf = urdf.replace(
-            f'"{side}_foot_joint" type="revolute"', f'"{side}_foot_joint" type="continuous"'
-        )
-    urdf = urdf.replace(
+    urdf = re.sub('(_foot_joint" type=)"revolute"', rf'\1"{kind}"', urdf).replace(
         '<axis xyz="1 0 0"/><limit lower="-1.5" upper="1.5"', '<axis xyz="0 1 0"/><limit'
     )
     with warns(RobotWarning, 2):
@@ -155,6 +155,7 @@ def test_a_wheel_has_its_radius_and_stays_below_its_axle():
     for foot in robot.feet:
         assert foot.radius == pytest.approx(0.08, abs=1e-5)
         assert np.allclose(foot.centre, [0.0, 0.02, 0.0], atol=1e-5)
+        assert str(foot.axis) == ("[0. 1. 0.]" if shape.startswith("cylinder") else "None")
 
 
 def test_arms_and_robots_without_limbs_have_no_feet_and_feet_can_be_declined():
