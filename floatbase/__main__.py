@@ -173,12 +173,12 @@ def _run(options: argparse.Namespace, further: Sequence[str], given: Sequence[st
 
 def _load_robot(options: argparse.Namespace) -> fb.Robot:
     """Load the robot named on the command line."""
+    load_file = file_loader(options.robot)
     described: dict[str, Any] = {
         "feet": options.feet,
         "foot_radius": options.foot_radius,
-        "posture": _posture(options.posture),
+        "posture": _posture(options.posture, load_file is fb.load_mjcf),
     }
-    load_file = file_loader(options.robot)
     if load_file is None:
         return fb.load(options.robot, **described)
     if options.fixed:
@@ -188,8 +188,10 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     return load_file(options.robot, **described)
 
 
-def _posture(entries: Sequence[str]) -> dict[str, float] | None:
-    """Return joint positions given as JOINT=ANGLE, or None if there are none."""
+def _posture(entries: Sequence[str], has_keyframes: bool) -> dict[str, float] | str | None:
+    """Return joint positions given as JOINT=ANGLE, the name of a keyframe, or None by default."""
+    if has_keyframes and len(entries) == 1 and "=" not in entries[0]:
+        return entries[0]
     angles = {}
     for entry in entries:
         joint, _, angle = entry.rpartition("=")
@@ -198,7 +200,7 @@ def _posture(entries: Sequence[str]) -> dict[str, float] | None:
         except ValueError:
             raise fb.FloatbaseError(
                 f"--posture has {entry!r}. Write the name of a joint and its position, as in "
-                f"'*_knee=0.6'."
+                f"'*_knee=0.6', or alone the name of a keyframe of an MJCF."
             ) from None
     return angles or None
 

@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import RobotWarning
+from floatbase.robots.inertia import write_numbers
 
 _PRISM_SIDES = 24  # sides of the prism that approximates a cylinder to 1 % of its radius
 _N_DIRECTIONS = 1000  # points on a sphere: a ball of 10 cm flattens by 0.2 mm
@@ -88,13 +89,8 @@ def sphere_directions() -> Array:
     i = np.arange(_N_DIRECTIONS)
     z, angle = 1.0 - (2.0 * i + 1.0) / _N_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
     radius = np.sqrt(1.0 - z**2)
-    return np.vstack(
-        [
-            np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z]),
-            np.eye(3),
-            -np.eye(3),
-        ]
-    )
+    spiral = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    return np.vstack([spiral, np.eye(3), -np.eye(3)])
 
 
 def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any) -> bool:
@@ -109,8 +105,7 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
     if path is None:
         return False
     try:
-        factors = [float(x) for x in mesh.get("scale", "1 1 1").split()]
-        scale = _unit(path) * np.broadcast_to(factors, (3,))
+        scale = _unit(path) * np.array(mesh.get("scale", "1 1 1").split(), dtype=np.float64)
         loader.load(str(path), scale)
     except (RuntimeError, ValueError) as error:
         warnings.warn(
@@ -121,7 +116,7 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
         )
         return False
     mesh.set("filename", str(path))
-    mesh.set("scale", " ".join(map(repr, scale.tolist())))
+    mesh.set("scale", write_numbers(scale))
     return True
 
 
@@ -183,6 +178,6 @@ def _inertia_box(link: ElementTree.Element) -> list[ElementTree.Element]:
     squares = 6.0 * (moments.sum() - 2.0 * moments) / float(mass.get("value", 0.0))
     shape = ElementTree.Element("collision")
     shape.extend(copy.copy(origin) for origin in link.findall("inertial/origin"))
-    size = " ".join(map(repr, np.sqrt(np.maximum(squares, 0.0)).tolist()))
+    size = write_numbers(np.sqrt(np.maximum(squares, 0.0)))
     ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "box", size=size)
     return [shape]

@@ -39,7 +39,6 @@ class Mjcf(NamedTuple):
     urdf: str
     model: pin.Model
     posture: Array
-    folder: Path
     has_keyframes: bool
     differences: list[str]  # between the robot and the file
 
@@ -76,7 +75,7 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
         armature[joint.idx_v] = writer.rotor_inertia(i)
     model.armature = armature
     posture = clamp_to_limits(model, pin.normalize(model, q))
-    return Mjcf(urdf, model, posture, folder, compiled.nkey > 0, writer.differences(missing))
+    return Mjcf(urdf, model, posture, compiled.nkey > 0, writer.differences(missing))
 
 
 def _drop_what_is_missing(spec: mujoco.MjSpec, folder: Path) -> list[str]:
