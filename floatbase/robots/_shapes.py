@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import RobotWarning
-from floatbase.robots.inertia import write_numbers
+from floatbase.robots.inertia import text_of
 
 _PRISM_SIDES = 24  # sides of the prism that approximates a cylinder to 1 % of its radius
 _N_DIRECTIONS = 1000  # points on a sphere: a ball of 10 cm flattens by 0.2 mm
@@ -65,7 +65,17 @@ def missing_meshes(urdf: str, folders: Sequence[Path]) -> list[str]:
     return sorted(name for name in names if _find_mesh(name, folders) is None)
 
 
-def shape_points(shape: Any) -> Array:
+def placed_points(shape: Any, joint: pin.SE3 | None = None) -> Array:
+    """Return points whose hull is a shape, shape (n, 3) [m]; none if its kind is unknown.
+
+    They are in the frame of the shape's joint, or in the one in which the joint has a placement.
+    """
+    place = shape.placement if joint is None else joint * shape.placement
+    points: Array = _points(shape.geometry) @ place.rotation.T + place.translation
+    return points
+
+
+def _points(shape: Any) -> Array:
     """Return points whose hull is a shape, shape (n, 3), in its frame [m]; none if unknown."""
     match shape:
         case coal.Box():
@@ -116,7 +126,7 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
         )
         return False
     mesh.set("filename", str(path))
-    mesh.set("scale", write_numbers(scale))
+    mesh.set("scale", text_of(scale))
     return True
 
 
@@ -178,6 +188,6 @@ def _inertia_box(link: ElementTree.Element) -> list[ElementTree.Element]:
     squares = 6.0 * (moments.sum() - 2.0 * moments) / float(mass.get("value", 0.0))
     shape = ElementTree.Element("collision")
     shape.extend(copy.copy(origin) for origin in link.findall("inertial/origin"))
-    size = write_numbers(np.sqrt(np.maximum(squares, 0.0)))
+    size = text_of(np.sqrt(np.maximum(squares, 0.0)))
     ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "box", size=size)
     return [shape]

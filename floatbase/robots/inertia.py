@@ -64,7 +64,7 @@ def read_numbers(element: ElementTree.Element | None, name: str) -> Array:
     return np.array(text.split(), dtype=np.float64)
 
 
-def write_numbers(numbers: npt.ArrayLike) -> str:
+def text_of(numbers: npt.ArrayLike) -> str:
     """Return numbers as a URDF has them, without rounding."""
     return " ".join(map(repr, np.ravel(numbers).astype(float).tolist()))
 
@@ -72,7 +72,7 @@ def write_numbers(numbers: npt.ArrayLike) -> str:
 def origin_attributes(place: pin.SE3) -> dict[str, str]:
     """Return the attributes of an <origin>."""
     rpy = pin.rpy.matrixToRpy(place.rotation)
-    return {"xyz": write_numbers(place.translation), "rpy": write_numbers(rpy)}
+    return {"xyz": text_of(place.translation), "rpy": text_of(rpy)}
 
 
 def read_inertia(link: ElementTree.Element) -> pin.Inertia:
@@ -95,7 +95,7 @@ def _write_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
     for old in link.findall("inertial"):
         link.remove(old)
     inertial, tensor = ElementTree.SubElement(link, "inertial"), inertia.inertia
-    ElementTree.SubElement(inertial, "origin", xyz=write_numbers(inertia.lever), rpy="0 0 0")
+    ElementTree.SubElement(inertial, "origin", xyz=text_of(inertia.lever), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
     upper = zip(_UPPER, tensor[np.triu_indices(3)], strict=True)
     ElementTree.SubElement(inertial, "inertia", {f"i{axes}": repr(float(x)) for axes, x in upper})
