@@ -224,9 +224,10 @@ class _Writer:
         place = place * (pin.SE3(pin.exp3(back), np.zeros(3)) if is_hinge else _offset(back))
         lower, upper = model.jnt_range[joint] if limited else np.zeros(2)
         dof = model.jnt_dofadr[joint]
+        effort = text_of(self._largest_torque(joint))
         rest = (
             f"<axis xyz='{text_of(model.jnt_axis[joint])}'/><limit lower='{text_of(lower)}' "
-            f"upper='{text_of(upper)}' effort='{text_of(self._largest_torque(joint))}' velocity='0'/>"
+            f"upper='{text_of(upper)}' effort='{effort}' velocity='0'/>"
             f"<dynamics damping='{text_of(model.dof_damping[dof])}' "
             f"friction='{text_of(model.dof_frictionloss[dof])}'/>"
         )
