@@ -21,8 +21,8 @@ from floatbase.robots import catalogue, load
 from .looks import control, eventually, picture
 
 SIDES = ("left", "right")
-ARM = """<mujoco><worldbody><body><joint name="rail" type="slide"/><geom size="1"/></body></worldbody>
-<keyframe><key name="zero"/><key name="up" qpos="0.5"/></keyframe></mujoco>"""
+ARM = """<mujoco><worldbody><body><joint name="rail" type="slide"/><geom size="1"/></body>
+</worldbody><keyframe><key name="zero"/><key name="up" qpos="0.5"/></keyframe></mujoco>"""
 
 
 def test_the_robots_are_listed(capsys):
