@@ -184,8 +184,10 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     return fb.load(options.robot, **described)
 
 
-def _posture(entries: Sequence[str]) -> dict[str, float] | None:
-    """Return joint positions given as JOINT=ANGLE, or None if there are none."""
+def _posture(entries: Sequence[str]) -> dict[str, float] | str | None:
+    """Return joint positions given as JOINT=ANGLE, the name of a keyframe, or None by default."""
+    if len(entries) == 1 and "=" not in entries[0]:
+        return entries[0]
     angles = {}
     for entry in entries:
         joint, _, angle = entry.rpartition("=")
@@ -194,7 +196,7 @@ def _posture(entries: Sequence[str]) -> dict[str, float] | None:
         except ValueError:
             raise fb.FloatbaseError(
                 f"--posture has {entry!r}. Write the name of a joint and its position, as in "
-                f"'*_knee=0.6'."
+                f"'*_knee=0.6', or alone the name of a keyframe of an MJCF."
             ) from None
     return angles or None
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 from floatbase._validation import Array, as_positive, short_repr
 from floatbase.errors import InputError
 from floatbase.robots._checks import clamp_to_limits, has_floating_base, joint_limits
-from floatbase.robots._shapes import link_shapes, shape_points
+from floatbase.robots._shapes import link_shapes, placed_points
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
@@ -120,7 +120,7 @@ def _find_feet(model: pin.Model, urdf: str, folders: Sequence[Path], q: Array) -
     lowest = dict[int, tuple[float, str]]()  # height of the lowest point of a limb, and its link
     for joint in ends:
         heights = [
-            (float(_points(data.oMi[joint], shape)[:, 2].min()), _link_of(model, shape))
+            (float(placed_points(shape, data.oMi[joint])[:, 2].min()), _link_of(model, shape))
             for shape in shapes
             if shape.parentJoint == joint
         ] or [
@@ -161,15 +161,15 @@ def _bent_posture(robot: Robot) -> Array | None:
     legs = sorted({i for f in frames for i in model.supports[model.frames[f].parentJoint]} - {0, 1})
     if not legs:  # the feet belong to the base
         return None
-    columns = np.array([model.idx_vs[i] for i in legs])
+    columns = np.array(model.idx_vs)[legs]
+    flat = np.array([foot.is_flat for foot in robot.feet])
 
-    def feet(q: Array) -> list[tuple[Array, Array]]:
-        """Return the middle of each foot and the z axis of its frame."""
+    def feet(q: Array) -> tuple[Array, Array]:
+        """Return the middles of the feet, (n, 3), and the tilts of the flat ones, (m, 2)."""
         pin.framesForwardKinematics(model, data, q)
-        return [
-            (data.oMf[frame].act(np.array(foot.middle)), data.oMf[frame].rotation[:, 2])
-            for frame, foot in zip(frames, robot.feet, strict=True)
-        ]
+        pairs = list(zip([data.oMf[frame] for frame in frames], robot.feet, strict=True))
+        middles = np.array([pose.act(np.array(foot.middle)) for pose, foot in pairs])
+        return middles, np.array([pose.rotation[:2, 2] for pose, _ in pairs])[flat]
 
     def bend(x: Array) -> Array:
         """Return the posture after a displacement of the legs' joints."""
@@ -177,21 +177,14 @@ def _bent_posture(robot: Robot) -> Array | None:
         v[columns] = x
         return np.asarray(pin.integrate(model, start, v))
 
-    now, straight = feet(start), feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
-    top = max(data.oMi[i].translation[2] for i in legs)
-    targets = [
-        np.array([x, y, max(z + _CROUCH * (top - z), present[2])])
-        for ((x, y, z), _), (present, _) in zip(straight, now, strict=True)
-    ]
+    now, _ = feet(start)
+    targets, _ = feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
+    top, z = max(data.oMi[i].translation[2] for i in legs), targets[:, 2]
+    targets[:, 2] = np.maximum(z + _CROUCH * (top - z), now[:, 2])
 
     def errors(x: Array) -> Array:
-        rows = [
-            np.concatenate([middle - target, z_axis[:2] if foot.is_flat else []])
-            for (middle, z_axis), target, foot in zip(
-                feet(bend(x)), targets, robot.feet, strict=True
-            )
-        ]
-        return np.concatenate(rows)
+        middles, tilts = feet(bend(x))
+        return np.concatenate([(middles - targets).ravel(), tilts.ravel()])
 
     lower, upper = np.full((2, model.nv), [[-np.inf], [np.inf]])
     joints, index, low, high = joint_limits(model)
@@ -230,18 +223,8 @@ def _shapes_of(
     """
     links = {link for joint in joints for link in _links_of(model, joint)}
     shapes, incomplete = link_shapes(model, urdf, folders, links=links)
-    return [
-        shape
-        for shape in shapes
-        if _link_of(model, shape) not in incomplete and shape_points(shape.geometry).any()
-    ]
-
-
-def _points(placement: pin.SE3, shape: Any) -> Array:
-    """Return points whose hull is a shape, shape (n, 3), where its joint has a placement [m]."""
-    place = placement * shape.placement
-    points: Array = shape_points(shape.geometry) @ place.rotation.T + place.translation
-    return points
+    found = [shape for shape in shapes if _link_of(model, shape) not in incomplete]
+    return [shape for shape in found if len(p := placed_points(shape)) and np.ptp(p, axis=0).any()]
 
 
 def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Sequence[str]) -> Foot:
@@ -258,9 +241,9 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
         return Foot(links[0])
     straight = model.createData()
     pin.framesForwardKinematics(model, straight, clamp_to_limits(model, pin.neutral(model)))
-    foot = _wheel(model, frame, own) if _turns_freely(model, joint) else None
-    if foot is not None:
-        return foot
+    wheel = _wheel(model, frame, own) if _turns_freely(model, joint) else None
+    if wheel is not None:
+        return wheel
     world = data.oMi[joint]
     for link in links if n_joints >= _SOLE_JOINTS else ():
         link_frame = model.getFrameId(link, pin.BODY)
@@ -268,7 +251,7 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
             corners = _sole(model.frames[link_frame].placement.inverse(), own)
             if corners is not None:
                 return Foot(link, corners=corners)
-    lowest = min(own, key=lambda shape: float(_points(world, shape)[:, 2].min()))
+    lowest = min(own, key=lambda shape: float(placed_points(shape, world)[:, 2].min()))
     return _ball(frame, world, lowest)
 
 
@@ -282,9 +265,8 @@ def _turns_freely(model: pin.Model, joint: int) -> bool:
 def _wheel(model: pin.Model, frame: pin.Frame, shapes: list[Any]) -> Foot | None:
     """Return the wheel or driven ball that shapes form, or None if they are not round."""
     joint, data = frame.parentJoint, model.createData()
-    axis = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
-    axis = axis[3:, model.idx_vs[joint]]
-    points = np.vstack([_points(pin.SE3.Identity(), shape) for shape in shapes])
+    J = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
+    axis, points = J[3:, model.idx_vs[joint]], np.vstack(list(map(placed_points, shapes)))
     along = points @ axis
     across = points @ np.linalg.svd(axis[None])[2][1:].T
     radius = float(np.linalg.norm(across, axis=1).max())
@@ -305,7 +287,7 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
         [
             [placement.act(shape.placement.translation) - [0.0, 0.0, shape.geometry.radius]]
             if isinstance(shape.geometry, coal.Sphere)
-            else _points(placement, shape)
+            else placed_points(shape, placement)
             for shape in shapes
         ]
     )
@@ -314,8 +296,7 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
     if len(sole) < 3 or np.any(np.ptp(sole[:, :2], axis=0) < _MIN_SOLE * size) or not size.all():
         return None
     # the corners farthest to the front left, front right, rear right and rear left
-    farthest = [int(np.argmax(sole[:, :2] @ (sign / size))) for sign in _DIAGONALS]
-    farthest = list(dict.fromkeys(farthest))
+    farthest = list(dict.fromkeys((sole[:, :2] @ (_DIAGONALS / size).T).argmax(axis=0).tolist()))
     if len(farthest) < 3:
         return None
     corners = np.column_stack([sole[farthest, :2], np.full(len(farthest), bottom)])
@@ -327,7 +308,7 @@ def _ball(frame: pin.Frame, world: pin.SE3, shape: Any) -> Foot:
     if isinstance(shape.geometry, coal.Sphere):
         radius, centre = shape.geometry.radius, shape.placement.translation
     else:
-        points = _points(world, shape)
+        points = placed_points(shape, world)
         size, bottom = np.ptp(points, axis=0), points[:, 2].min()
         radius = 0.5 * size.min()
         low = points[points[:, 2] < bottom + _SOLE_DEPTH * size.max()].mean(axis=0)

@@ -15,24 +15,13 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import (
-    Array,
-    as_bool,
-    as_string,
-    as_strings,
-    short_repr,
-)
+from floatbase._validation import Array, as_bool, as_string, as_strings, short_repr
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
 from floatbase.robots.feet import as_feet, with_bent_legs
-from floatbase.robots.plausibility import (
-    missing_meshes_message,
-    passive_joints_message,
-    problems,
-    straight_legs_message,
-)
+from floatbase.robots.plausibility import missing_meshes_message, passive_joints_message, problems
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
     check_model,
@@ -150,16 +139,11 @@ def load(
     root = Path(data.getModelPath(path)).resolve()
     urdf = normalize_urdf(name, read_text(root / path), loader.free_flyer)
     model = parse_urdf(name, urdf, loader.free_flyer)
-    srdf = (
-        root / loader.path / loader.srdf_subpath / loader.srdf_filename
-        if loader.srdf_filename
-        else None
-    )
     # also if a posture is given, since it reads the rotor inertias
-    start = _reference_posture(model, loader, srdf, entry)
+    start = _reference_posture(model, loader, root, entry)
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
-    robot = _make_robot(
+    return _make_robot(
         name,
         urdf,
         model,
@@ -173,7 +157,6 @@ def load(
         description=entry.description,
         sources=entry.sources,
     )
-    return _checked(robot, feet)
 
 
 def _file_loader(path: str) -> Callable[..., Robot] | None:
@@ -268,14 +251,12 @@ def load_urdf(
         urdf = urdf.lstrip(_WHITESPACE)
     else:
         file = Path(os.path.expanduser(urdf))
-        if not os.path.exists(file):  # not file.exists(), which raises for a name that is too long
-            import example_robot_data as data
-
-            if urdf in data.robots_loader.ROBOTS:
-                raise InputError(
-                    f"There is no file {urdf}, but there is a robot with this name. Load it with "
-                    f'fb.load("{urdf}").'
-                )
+        # not file.exists(), which raises for a name that is too long
+        if urdf in CATALOGUE and not os.path.exists(file):
+            raise InputError(
+                f"There is no file {urdf}, but there is a robot with this name. Load it with "
+                f'fb.load("{urdf}").'
+            )
         urdf, directories = read_text(file), (*directories, file.resolve().parent)
     urdf = normalize_urdf(name, urdf, floating)
     model = parse_urdf(name, urdf, floating)
@@ -290,12 +271,13 @@ def load_urdf(
         feet,
         foot_radius,
         package_dirs=directories,
+        choose_posture=posture is None,
     )
-    messages = [
-        passive_joints_message(robot) if torque_limits is None else "",
-        missing_meshes_message(robot) if directories else "",
-    ]
-    return _checked(robot, feet, messages, bend_legs=posture is None)
+    if torque_limits is None:
+        _warn(passive_joints_message(robot))
+    if directories:
+        _warn(missing_meshes_message(robot))
+    return robot
 
 
 def load_mjcf(
@@ -361,15 +343,16 @@ def load_mjcf(
     """
     from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
 
-    file = Path(
-        os.path.expanduser(as_string("path", str(path) if isinstance(path, Path) else path))
-    )
+    path = as_string("path", str(path) if isinstance(path, Path) else path)
+    file = Path(os.path.expanduser(path))
     if floating is not None:
         as_bool("floating", floating)
     name = file.stem if name is None else as_string("name", name)
     keyframe = posture if isinstance(posture, str) else None
     mjcf = read_mjcf(name, file, floating, keyframe)
-    robot = _make_robot(
+    if mjcf.differences:
+        _warn(f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}.")
+    return _make_robot(
         name,
         mjcf.urdf,
         mjcf.model,
@@ -378,14 +361,10 @@ def load_mjcf(
         torque_limits,
         feet,
         foot_radius,
-        package_dirs=(mjcf.folder,),
+        package_dirs=(file.resolve().parent,),
+        choose_posture=posture is None,
+        bend_legs=not mjcf.has_keyframes,
     )
-    messages = (
-        [f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."]
-        if mjcf.differences
-        else []
-    )
-    return _checked(robot, feet, messages, bend_legs=posture is None and not mjcf.has_keyframes)
 
 
 def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
@@ -410,9 +389,14 @@ def _make_robot(
     known_feet: tuple[Foot, ...] | None = None,
     *,
     package_dirs: tuple[Path, ...],
+    choose_posture: bool = False,
+    bend_legs: bool = True,
     **fields: Any,
 ) -> Robot:
-    """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
+    """Build a robot from a URDF text and its model, and warn about it.
+
+    If the posture is not the user's choice, legs that would be straight are bent or warned about.
+    """
     locked, floating = as_strings("locked", locked), has_floating_base(model)
     joints = list(model.names)[2 if floating else 1 :]
     for joint in locked:
@@ -430,33 +414,28 @@ def _make_robot(
         kept_joints = [
             full_model.joints[full_model.getJointId(joint)] for joint in list(model.names)[1:]
         ]
-        posture = [x for joint in kept_joints for x in q[joint.idx_q :][: joint.nq]]
-        model.armature = np.array(
-            [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
+        posture = np.concatenate([q[joint.idx_q :][: joint.nq] for joint in kept_joints])
+        model.armature = np.concatenate(
+            [full_model.armature[joint.idx_v :][: joint.nv] for joint in kept_joints]
         )
     check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
     posture = as_posture(name, model, posture)
-    feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
-    return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
-
-
-def _checked(
-    robot: Robot,
-    feet: Sequence[str | Foot] | None,
-    messages: Sequence[str] = (),
-    bend_legs: bool = False,
-) -> Robot:
-    """Return a robot, with bent legs if requested, after warnings about it and further ones."""
-    if bend_legs:
+    found = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    robot = Robot(name, model, urdf, package_dirs, found, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
+    if choose_posture and bend_legs:
         robot = with_bent_legs(robot)
-        messages = [*messages, straight_legs_message(robot)]
-    for message in (*messages, *problems(robot, feet or ())):
-        if message:
-            warn(message, RobotWarning)
+    for message in problems(robot, feet or (), choose_posture):
+        _warn(message)
     return robot
+
+
+def _warn(message: str) -> None:
+    """Warn about a robot, unless the message is empty."""
+    if message:
+        warn(message, RobotWarning)
 
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
@@ -480,24 +459,20 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     return known[name]
 
 
-def _reference_posture(
-    model: pin.Model, loader: Any, srdf: Path | None, entry: CatalogueEntry
-) -> Array:
+def _reference_posture(model: pin.Model, loader: Any, root: Path, entry: CatalogueEntry) -> Array:
     """Return the reference posture of the SRDF with the joint angles of the catalogue.
 
     The rotor inertias of the SRDF are stored in the model.
     """
     q = pin.neutral(model)
-    if srdf is not None:
+    if loader.srdf_filename:
+        srdf = str(root / loader.path / loader.srdf_subpath / loader.srdf_filename)
         if loader.has_rotor_parameters:
-            pin.loadRotorParameters(model, str(srdf), False)
+            pin.loadRotorParameters(model, srdf, False)
             model.armature = model.rotorInertia * model.rotorGearRatio**2
-        pin.loadReferenceConfigurations(model, str(srdf), False)
-        q = np.array(
-            {found.key(): found.data() for found in model.referenceConfigurations}.get(
-                loader.ref_posture, q
-            )
-        )
+        pin.loadReferenceConfigurations(model, srdf, False)
+        postures = {found.key(): found.data() for found in model.referenceConfigurations}
+        q = np.array(postures.get(loader.ref_posture, q))
     for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle
     return clamp_to_limits(model, pin.normalize(model, q))

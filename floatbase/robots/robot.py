@@ -187,10 +187,9 @@ class Robot(Value):
         object.__setattr__(self, "posture", as_posture(self.name, self.model, self.posture))
         object.__setattr__(self, "torque_limits", as_torque_limits(self.d, self.torque_limits))
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
-        for foot in self.feet:
-            if [self.frame_id(other.frame) for other in self.feet].count(
-                self.frame_id(foot.frame)
-            ) > 1:
+        frames = [self.frame_id(foot.frame) for foot in self.feet]
+        for foot, frame in zip(self.feet, frames, strict=True):
+            if frames.count(frame) > 1:
                 raise InputError(
                     f"Duplicate foot {foot.frame!r} of {self.name}. Name each foot once."
                 )
@@ -217,26 +216,17 @@ class Robot(Value):
         scale = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
         values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
         participation = np.abs(vectors[:, values < _SINGULAR_M]).max(axis=1, initial=0.0)
-        names = [*["its base"] * (self.nv - self.d), *self.joint_names]
-        massless = list(
-            dict.fromkeys(
-                name
-                for name, value in zip(names, participation, strict=True)
-                if value > _PARTICIPATION_TOLERANCE
-            )
-        )
-        if massless:
-            joints = [name for name in massless if name != "its base"]
-            lock_hint = f", or lock joints, as with locked={joints}" if joints else ""
-            fix_hint = (
-                ", or load the robot with floating=False if it is bolted to the ground"
-                if "its base" in massless
-                else ""
-            )
+        massless, n_base = participation > _PARTICIPATION_TOLERANCE, self.nv - self.d
+        joints = np.array(self.joint_names)[massless[n_base:]].tolist()
+        parts, hint = list(joints), f", or lock joints, as with locked={joints}" if joints else ""
+        if massless[:n_base].any():
+            parts.insert(0, "its base")
+            hint += ", or load the robot with floating=False if it is bolted to the ground"
+        if parts:
             raise InputError(
                 f"{self.name} has a singular inertia matrix M in its posture: "
-                f"{', '.join(massless)} can accelerate without moving any mass. Give these links "
-                f"mass and inertia{lock_hint}{fix_hint}."
+                f"{', '.join(parts)} can accelerate without moving any mass. Give these links "
+                f"mass and inertia{hint}."
             )
 
     @cached_property

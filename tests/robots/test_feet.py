@@ -181,8 +181,8 @@ def test_a_posture_may_be_given_by_joint_names():
     assert by_name["L_ankle_joint"] == [0.0]
     go2, other = judges.load("go2"), fb.load("go2", posture={"FL_calf_joint": -1.0})
     assert np.count_nonzero(other.posture != go2.posture) == 1
-    with raises(UnknownNameError, "FL_calf", "FL_calf_joint"):
-        fb.load("go2", posture={"FL_calf": -1.0})
+    with raises(UnknownNameError, "*_calf", *go2.joint_names):
+        fb.load("go2", posture={"*_calf": -1.0})
     with raises(InputError, "FL_calf_joint", "straight"):
         fb.load("go2", posture={"FL_calf_joint": "straight"})
     with raises(InputError, "FL_calf_joint", 9, -0.83776):

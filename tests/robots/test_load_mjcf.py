@@ -123,6 +123,20 @@ def test_keyframes_are_postures(quadruped):
     assert quadruped(posture=quadruped().posture) == quadruped()
 
 
+@pytest.mark.parametrize(
+    ("knee", "quaternion", "named"),
+    [(-1.5, "0 1 0 0", "w, x, y, z"), (0.0, "1 0 0 0", "legs"), (-1.5, "1 0 0 0", None)],
+)
+def test_a_keyframe_upside_down_or_with_straight_legs_is_reported(load, knee, quaternion, named):
+    home = HOME.replace("-1.5", str(knee)).replace("0.1 0.8", "0 0.4")
+    text = QUADRUPED.replace("0.6 0 0 0.8", quaternion).replace(HOME, home)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load(text.replace("-150 -5", "-150 0"))
+    found = [str(each.message) for each in caught]
+    assert len(found) == (named is not None) and all(named in message for message in found)
+
+
 def test_a_quadruped_stands_on_its_named_geoms_and_takes_a_push(quadruped):
     robot = quadruped()
     state, contacts = robot.standing(), fb.Contacts.feet(robot)

@@ -34,11 +34,6 @@ def test_a_model_of_our_own_is_the_same_to_mujoco(path):
     assert judges.relative(state.h, judge.h) < 1e-9
 
 
-def test_an_arm_may_be_bolted_down_or_float():
-    urdf = fb.load("ur5").urdf
-    assert (fb.load_urdf(urdf, floating=False).nv, fb.load_urdf(urdf).nv) == (6, 12)
-
-
 def test_a_robot_without_its_bolts_has_the_joints_and_links_it_had_and_may_stand_on_a_plate():
     arm = fb.load("ur5", posture=[0.0, -1.7, 1.2, 0.5, 1.5, 0.0])
     loose, standing = with_floating_base(arm), with_floating_base(arm, plate=True)
@@ -215,7 +210,6 @@ def test_a_leader_moves_alone_only_if_its_followers_are_locked_by_name():
     [
         (two_links(mass=-0.5), ("inertial", "top", "mass", -0.5)),
         (two_links(mass="inf"), ("inertial", "top", "mass", np.inf)),
-        (two_links(mass="1,5"), ("inertial", "top", "mass", "1,5")),
         (two_links(iyy="nan"), ("inertial", "top", "iyy", np.nan)),
         (two_links(iyy=-0.1), ("elbow", "inertia", -0.1)),
         (two_links().replace("0 1 0", "0 0 0"), ("elbow", "axis")),
@@ -229,7 +223,6 @@ def test_a_leader_moves_alone_only_if_its_followers_are_locked_by_name():
         (fingers("", '<mimic joint="j2"/>', '<mimic joint="j1"/>'), ("j1", "j2", "mimic")),
         (two_links(extra=LIMIT + "<mimic/>"), ("elbow", "mimic", "joint")),
         (two_links(mass=0, iyy=0), ("M", "elbow", "locked")),
-        (two_links(extra=LIMIT + "<xacro:a/>"), ("URDF", "xacro")),
         (two_links(extra=""), ("elbow", "limit")),
         (two_links().replace('k name="top"', 'k name="base"'), (2, "base")),
         ("<html/>", ("html", "robot")),
@@ -315,6 +308,5 @@ def test_lengths_that_are_not_in_metres_are_reported(unit, reported):
         warnings.simplefilter("always")
         fb.load_urdf(urdf, name="solo12")
     messages = [str(each.message) for each in caught if each.category is RobotWarning]
-    assert ["solo12" in message and "metres" in message for message in messages] == [
-        True
-    ] * reported
+    assert len(messages) == reported
+    assert all("solo12" in message and "metres" in message for message in messages)
