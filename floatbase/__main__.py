@@ -227,10 +227,8 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM; `given` are the arguments of the command line."""
-    from floatbase.playground import (
-        Playground,
-        Settings,
-    )  # imports MuJoCo and the viewer, which the other commands do not need
+    # imports MuJoCo and the viewer, which the other commands do not need
+    from floatbase.playground import Playground, Settings
 
     ended = threading.Event()
     before = {

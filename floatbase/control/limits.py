@@ -133,13 +133,11 @@ class LinearInequality(Value):
             If the shapes do not fit.
         """
         n = getattr(eom, SIZES[self.block])
-        if (
-            not callable(self.coefficients) and np.shape(self.coefficients[0])[1] == n
-        ):  # everything else was checked at construction
+        if callable(self.coefficients):
+            return self._checked(self.coefficients(eom, t), n)
+        if np.shape(self.coefficients[0])[1] == n:  # everything else was checked at construction
             return cast("tuple[Array, Array]", self.coefficients)
-        return self._checked(
-            self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n
-        )
+        return self._checked(self.coefficients, n)
 
     def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
         """Return a label for each of m rows.

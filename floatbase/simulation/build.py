@@ -32,13 +32,8 @@ from floatbase.simulation.hulls import link_hulls
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
-_CONTACT_IMPEDANCE = (
-    0.95,
-    0.99,
-    0.001,
-    0.5,
-    2.0,
-)  # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
+# MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
+_CONTACT_IMPEDANCE = 0.95, 0.99, 0.001, 0.5, 2.0
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
 # s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
@@ -192,11 +187,8 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         for body in bodies
         if body.joints or (robot.is_floating and body.parent.name == "world")
     }
-    inconsistent = [
-        body
-        for body in bodies
-        if body.name in inertias and not _is_physically_consistent(inertias[body.name])
-    ]
+    moving = [body for body in bodies if body.name in inertias]
+    inconsistent = [b for b in moving if not _is_physically_consistent(inertias[b.name])]
     if inconsistent:
         raise SimulationError(_inertia_error(robot, inconsistent, inertias[inconsistent[0].name]))
     for body in bodies:
@@ -250,9 +242,8 @@ def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
         inertia.inertia = tensor
     for child in body.bodies:
         if not child.joints:
-            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(
-                _fused_inertia(child)
-            )
+            placement = pin.SE3(rotation_matrix(child.quat), np.array(child.pos))
+            inertia = inertia + placement.act(_fused_inertia(child))
     return inertia
 
 
@@ -271,15 +262,12 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
     others = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
     joints = [joint.name for body in bodies for joint in body.joints]
-    weld = (
-        f", or weld such links to their parents with locked={joints} of fb.load" if joints else ""
-    )
+    weld = f", or weld such links to their parents with locked={joints} of fb.load"
     return (
         f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}. Together with the "
-        f"links welded to it, it has "
-        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} "
-        f"kg m². All of these must be positive, and no principal inertia may exceed the sum of the "
-        f"other two. Correct the URDF{weld}."
+        f"links welded to it, it has {inertia.mass:.4g} kg and principal inertias {smallest:.4g}, "
+        f"{middle:.4g}, {largest:.4g} kg m². All of these must be positive, and no principal "
+        f"inertia may exceed the sum of the other two. Correct the URDF{weld if joints else ''}."
     )
 
 

@@ -29,16 +29,12 @@ def link_hulls(robot: Robot, folders: tuple[Path, ...]) -> tuple[tuple[int, Arra
         return ()
     clouds = dict[int, list[Array]]()
     for item in link_shapes(robot.model, robot.urdf, folders)[0]:
-        points = (
-            shape_points(item.geometry) @ item.placement.rotation.T + item.placement.translation
-        )
+        points = shape_points(item.geometry) @ item.placement.rotation.T
+        points += item.placement.translation
         clouds.setdefault(int(item.parentJoint), []).append(points)
     hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
-    return tuple(
-        (joint, read_only(_extreme_points(points)))
-        for joint, points in hulls.items()
-        if _thickness(points) > _MIN_THICKNESS
-    )
+    thick = [joint for joint, points in hulls.items() if _thickness(points) > _MIN_THICKNESS]
+    return tuple((joint, read_only(_extreme_points(hulls[joint]))) for joint in thick)
 
 
 def _thickness(points: Array) -> float:
