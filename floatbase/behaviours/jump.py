@@ -169,12 +169,8 @@ class JumpPlan(Value):
             s, rate, acceleration = minimum_jerk(u)
             T = self.push - self.crouch
             return s * down, rate / T * down, acceleration / T**2 * down
-        s = min(t, self.take_off) - self.push
-        return (
-            np.array([0.0, -self.depth]) + self.acceleration * s * s / 2.0,
-            self.acceleration * s,
-            self.acceleration,
-        )
+        s, a = min(t, self.take_off) - self.push, self.acceleration
+        return np.array([0.0, -self.depth]) + a * s * s / 2.0, a * s, a
 
 
 class Jump:
@@ -388,11 +384,11 @@ class Jump:
         """Return how much higher the ground is at the landing place than at the start [m]."""
         if self._ground is None:
             return 0.0
-        levels = [
-            self._ground_level(self._standing.point(name)[:2] + [self._distance, 0.0] + around)
-            for name in self._all_contacts.names
-            for around in foot_outline(self._robot.foot(name), 0.0)
-        ]
+        levels = []
+        for name in self._all_contacts.names:
+            landing = self._standing.point(name)[:2] + [self._distance, 0.0]
+            outline = foot_outline(self._robot.foot(name), 0.0)
+            levels += [self._ground_level(landing + around) for around in outline]
         if max(levels) - min(levels) > _MAX_UNEVENNESS:
             raise InputError(
                 f"With a distance of {self._distance:g} m, the feet would land at different "
@@ -417,9 +413,8 @@ class Jump:
             return self._standing.com + planned[0], planned[1], planned[2]
         # critical damping: after a fall to the same height, the body sinks by v / (e rate), as far
         # as in the crouch
-        rate = max(
-            self._plan.velocity[1] / (e * self._plan.depth), sqrt(self._robot.gravity / self._leg)
-        )
+        pendulum = sqrt(self._robot.gravity / self._leg)
+        rate = max(self._plan.velocity[1] / (e * self._plan.depth), pendulum)
         s, offset = t - self._since, self._com - self._goal
         slope, decay = self._com_velocity + rate * offset, np.exp(-rate * s)
         position = decay * (offset + slope * s)

@@ -133,10 +133,8 @@ class JointLimits(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        sizes = {
-            name: len(getattr(self, name))
-            for name in ("lower", "upper", "velocity", "acceleration", "braking")
-        }
+        names = ("lower", "upper", "velocity", "acceleration", "braking")
+        sizes = {name: len(getattr(self, name)) for name in names}
         if len(set(sizes.values())) > 1:
             raise InputError(f"Joint limits need one number per joint, but the sizes are {sizes}.")
         if np.any(self.lower > self.upper):
@@ -301,10 +299,8 @@ class JointLimits(Value):
         planned = as_array("qdd", qdd, (robot.nv,), "m/s² or rad/s²")[robot.nv - robot.d :]
         least, largest = self.bounds(q, v)
         tolerance = _REACHED_TOLERANCE * (1.0 + np.abs(planned))
-        reached: npt.NDArray[np.bool_] = (planned >= largest - tolerance) | (
-            planned <= least + tolerance
-        )
-        return reached
+        reached: npt.NDArray[np.bool_] = planned >= largest - tolerance
+        return reached | (planned <= least + tolerance)
 
     def _joints_of(self, state: State) -> tuple[Array, Array]:
         """Return positions [rad or m] and velocities [rad/s or m/s] of the joints, (d,) each."""
@@ -350,18 +346,17 @@ class JointLimits(Value):
             Names such as "FL_calf_joint position upper", for bounded joints only. The second word
             names the strictest limit in this state.
         """
-        upper, lower = self._upper_bounds(self.upper - q, v), self._upper_bounds(q - self.lower, -v)
-        return tuple(
-            ConstraintLabel(
-                f"{names[joint]} {_KINDS[kinds[joint]]} {side}",
-                f"{side} {_KINDS[kinds[joint]]} limit",
-                names[joint],
-            )
-            for side, (_, kinds), bounded in zip(
-                ("upper", "lower"), (upper, lower), self.bounded, strict=True
-            )
-            for joint in np.flatnonzero(bounded)
-        )
+        _, upper_kinds = self._upper_bounds(self.upper - q, v)
+        _, lower_kinds = self._upper_bounds(q - self.lower, -v)
+        labels = []
+        sides = zip(("upper", "lower"), (upper_kinds, lower_kinds), self.bounded, strict=True)
+        for side, kinds, bounded in sides:
+            for i in np.flatnonzero(bounded):
+                kind, joint = _KINDS[kinds[i]], names[i]
+                labels.append(
+                    ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
+                )
+        return tuple(labels)
 
     def rows(self, state: State) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
         """Return G, h and names of the inequalities G q̈ ≤ h at a state.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -393,9 +392,10 @@ class Recorder:
 
     def _targets_by_name(self) -> dict[str, Array]:
         """Return the targets of each task, shape (n, m), with NaN in rows without that task."""
-        widths = Counter[str]()
+        widths: dict[str, int] = {}
         for entries in {id(entries): entries for _, _, entries in self._targets}.values():
-            widths |= Counter({name: part.stop - part.start for name, part in entries.items()})
+            for name, part in entries.items():
+                widths[name] = max(part.stop - part.start, widths.get(name, 0))
         targets = {name: np.full((self._n, width), np.nan) for name, width in widths.items()}
         for row, values, entries in self._targets:
             for name, part in entries.items():

@@ -433,16 +433,11 @@ class Gait(Value):
         if as_number("t", t, "s") <= self.start:
             return self
         almost_one = 1.0 - TIME_TOLERANCE / self.period
-        offsets = {
-            foot: (self._first_lift_off(foot) - t) / self.period % 1.0 for foot in self.offsets
-        }
-        return replace(
-            self,
-            offsets={
-                foot: 0.0 if offset >= almost_one else offset for foot, offset in offsets.items()
-            },
-            start=t,
-        )
+        offsets = dict(self.offsets)
+        for foot in offsets:
+            offset = (self._first_lift_off(foot) - t) / self.period % 1.0
+            offsets[foot] = 0.0 if offset >= almost_one else offset
+        return replace(self, offsets=offsets, start=t)
 
     def _allows_lift_off(self, time: float) -> bool:
         """Return whether feet may lift off at a time [s]."""
