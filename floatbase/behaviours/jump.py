@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._geometry import minimum_jerk
+from floatbase._geometry import bump, minimum_jerk
 from floatbase._validation import (
     Array,
     Value,
@@ -427,8 +427,7 @@ class Jump:
         plan, standing, gravity = self._plan, self._standing, self._robot.gravity
         s, T = max(t - self._since, 0.0), plan.touchdown - plan.take_off
         u = min(s / T, 1.0)
-        w = u * (1.0 - u)
-        fraction, rate, bend = minimum_jerk(u)
+        (fraction, rate, bend), (rise, rise_rate, rise_bend) = minimum_jerk(u), bump(u)
         fall = np.array([0.0, 0.0, -gravity])
         last = standing.point(foot) - standing.com + [plan.lead, 0.0, 0.0]
         first = last - [plan.lead + self._plan.com_offset(plan.take_off)[0][0], 0.0, 0.0]
@@ -436,10 +435,9 @@ class Jump:
         change = last - first
         return (
             self._com + self._com_velocity * s + fall * s * s / 2.0
-            + first + fraction * change + 64.0 * w**3 * tuck,
-            self._com_velocity + fall * s
-            + rate / T * change + 192.0 * w * w * (1.0 - 2.0 * u) / T * tuck,
-            fall + bend / T**2 * change + 384.0 * w * (1.0 - 5.0 * w) / T**2 * tuck,
+            + first + fraction * change + rise * tuck,
+            self._com_velocity + fall * s + rate / T * change + rise_rate / T * tuck,
+            fall + bend / T**2 * change + rise_bend / T**2 * tuck,
         )  # fmt: skip
 
     def _controller(self, contacts: Contacts, **options: Any) -> WholeBodyController:

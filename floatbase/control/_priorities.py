@@ -80,13 +80,9 @@ def solve_levels(
         change, T, rank = in_residuals(level, terms, free, x)
         found = solve(change, solver)
         x = x + T @ found.x
-        violations = solutions[-1].violations if solutions else {}
-        multipliers = dict(kept)
-        solutions.append(
-            replace(
-                found, qp=level, x=x, earlier_violations=violations, earlier_multipliers=multipliers
-            )
-        )
+        before = solutions[-1].violations if solutions else {}
+        solution = replace(found, qp=level, x=x, earlier_violations=before)
+        solutions.append(replace(solution, earlier_multipliers=dict(kept)))
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
         h, penalties = np.maximum(h, qp.G @ x + FEASIBILITY_TOLERANCE * qp.row_norms), None

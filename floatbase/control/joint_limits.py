@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -78,6 +79,16 @@ def _as_period(name: str, value: Any) -> float:
     if period < _MIN_PERIOD:
         raise InputError(f"{name} is {period:g} s. It must be at least {_MIN_PERIOD:g} s.")
     return period
+
+
+def check_parameters(cls: Any, names: Iterable[str]) -> None:
+    """Raise `InputError` for a name that is not one of the fields of a dataclass."""
+    for name in names:
+        if name not in cls.__dataclass_fields__:
+            raise InputError(
+                f"{cls.__name__} has no parameter {name!r}. It has "
+                f"{', '.join(cls.__dataclass_fields__)}."
+            )
 
 
 def as_weight(name: str, value: Any) -> float | None:
@@ -178,12 +189,7 @@ class JointLimits(Value):
             If an argument has a wrong type, shape or value.
         """
         limits = _limits_of(as_instance("robot", robot, Robot, 'fb.load("go2")'))
-        unknown = [name for name in changes if name not in cls.__dataclass_fields__]
-        if unknown:
-            raise InputError(
-                f"JointLimits has no parameter {unknown[0]!r}. It has "
-                f"{', '.join(cls.__dataclass_fields__)}."
-            )
+        check_parameters(cls, changes)
         if torque_limits is not None:
             torques = as_torque_limits(robot.d, torque_limits)
             changes = {"braking": _braking(robot, torques), **changes}
@@ -415,13 +421,10 @@ def _limits_of(robot: Robot) -> JointLimits:
     lower[index], upper[index] = least, largest
     at = _position_indices(robot)
     velocity = np.array(model.velocityLimit[robot.nv - d :])
-    return JointLimits(
-        lower=np.where(at >= 0, lower[at], -np.inf),
-        upper=np.where(at >= 0, upper[at], np.inf),
-        velocity=np.where(velocity > 0.0, velocity, np.inf),  # 0: not in the URDF
-        acceleration=np.full(d, np.inf),
-        braking=_braking(robot, robot.torque_limits),
-    )
+    lower, upper = np.where(at >= 0, lower[at], -np.inf), np.where(at >= 0, upper[at], np.inf)
+    velocity = np.where(velocity > 0.0, velocity, np.inf)  # 0: not in the URDF
+    braking = _braking(robot, robot.torque_limits)
+    return JointLimits(lower, upper, velocity, np.full(d, np.inf), braking)
 
 
 def _braking(robot: Robot, torque_limits: Array) -> Array:

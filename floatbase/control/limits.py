@@ -29,7 +29,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.control.joint_limits import JointLimits, as_weight
+from floatbase.control.joint_limits import JointLimits, as_weight, check_parameters
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -318,12 +318,7 @@ class Limits(Value):
             If an argument has a wrong type, shape or value.
         """
         as_instance("robot", robot, Robot, 'fb.load("go2")')
-        unknown = [name for name in options if name not in cls.__dataclass_fields__]
-        if unknown:
-            raise InputError(
-                f"Limits has no parameter {unknown[0]!r}. It has "
-                f"{', '.join(cls.__dataclass_fields__)}."
-            )
+        check_parameters(cls, options)
         torque_limits = robot.torque_limits if torque_limits is None else torque_limits
         torques = as_torque_limits(robot.d, torque_limits)
         if isinstance(joint_limits, str) and joint_limits == "robot":

@@ -509,11 +509,9 @@ def _selected_feet(
 ) -> list[tuple[Foot, float, Array]]:
     """Return the feet in contact, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
-    feet = (
-        robot.feet
-        if frames is None
-        else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
-    )
+    feet = robot.feet
+    if frames is not None:
+        feet = tuple(robot.foot(frame) for frame in as_strings("frames", frames))
     if not feet:
         raise InputError(
             f'{robot.name} has no feet. Name the frames in contact, frames=["…"]; robot.frames '

@@ -138,14 +138,9 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal)
     for x0, x1, y0, y1, top in ground.boxes:
-        half = 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            contype=1,
-            conaffinity=0,
-            pos=[x0 + half[0], y0 + half[1], top - half[2]],
-            size=half,
-        )
+        box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
+        centre = [x0 + half[0], y0 + half[1], top - half[2]]
+        spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
     for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
         _add_foot_balls(spec, foot, contact_of_foot.point_names)

@@ -54,13 +54,9 @@ class ActivePlan:
         self._entries = entries
         self._adjustment = adjustment
         self._path, self._swings = plan.path, plan.swings
-        usual = (
-            adjustment is None
-            and type(plan.plan) is LIPM
-            and plan.plan.omega == posture.omega
-            and all(type(path) is Swing for path in self._swings.values())
-        )
-        self._numbers = None if not (compiled and usual) else _compiled_module()
+        usual = adjustment is None and all(type(path) is Swing for path in self._swings.values())
+        usual = usual and type(plan.plan) is LIPM and plan.plan.omega == posture.omega
+        self._numbers = _compiled_module() if compiled and usual else None
         if self._numbers:
             self._write = self._numbers.write_targets
             self._body = self._pack_body(self._numbers)

@@ -339,12 +339,9 @@ class Gait(Value):
         t, first_lift_off = as_number("t", t, "s"), self._first_lift_off(foot)
         cycles = floor((t + TIME_TOLERANCE - first_lift_off) / self.period)
         lift_off = first_lift_off + cycles * self.period
-        swinging = (
-            cycles >= 0
-            and t < lift_off + self.swing - TIME_TOLERANCE
-            and self._allows_lift_off(lift_off)
-        )
-        return (lift_off, lift_off + self.swing) if swinging else None
+        touchdown = lift_off + self.swing
+        swinging = cycles >= 0 and t < touchdown - TIME_TOLERANCE
+        return (lift_off, touchdown) if swinging and self._allows_lift_off(lift_off) else None
 
     def stance(self, t: float) -> tuple[str, ...]:
         """Return the feet that stand at a given time.

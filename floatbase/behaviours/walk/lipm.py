@@ -133,12 +133,9 @@ class LIPM(Value):
         acceleration : ndarray, shape (2,)
             Acceleration in the world frame [m/s²].
         """
-        p, slope, a, b = self._evaluate(t)
-        return (
-            read_only(p + a + b),
-            read_only(slope + self.omega * (a - b)),
-            read_only(self.omega**2 * (a + b)),
-        )
+        (p, slope, a, b), omega = self._evaluate(t), self.omega
+        x, v = read_only(p + a + b), read_only(slope + omega * (a - b))
+        return x, v, read_only(omega**2 * (a + b))
 
     def dcm(self, t: float) -> Array:
         """Compute the divergent component of motion ξ = c + ċ / ω at a given time.
