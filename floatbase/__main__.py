@@ -50,11 +50,7 @@ def _parser() -> argparse.ArgumentParser:
         "shapes (default: the lowest ends of the limbs)",
     )
     view.add_argument(
-        "--foot-radius",
-        type=float,
-        default=None,
-        metavar="M",
-        help="radius of ball feet at these links [m]",
+        "--foot-radius", type=float, metavar="M", help="radius of ball feet at these links [m]"
     )
     view.add_argument(
         "--posture",
@@ -64,22 +60,13 @@ def _parser() -> argparse.ArgumentParser:
         help="joint positions [rad or m]; a * stands for any characters, as in '*_knee=0.6'; or "
         "the name of a keyframe in an MJCF",
     )
-    view.add_argument(
-        "--package-dirs",
-        nargs="+",
-        default=[],
-        metavar="FOLDER",
-        help="folders of a URDF's meshes named package://…",
-    )
+    meshes = "folders of a URDF's meshes named package://…"
+    view.add_argument("--package-dirs", nargs="+", default=[], metavar="FOLDER", help=meshes)
     view.add_argument(
         "--fixed", action="store_true", help="fix the root link of the file to the ground"
     )
-    view.add_argument(
-        "--friction",
-        type=float,
-        default=0.7,
-        help="friction coefficient of the ground (default: 0.7)",
-    )
+    friction = "friction coefficient of the ground (default: 0.7)"
+    view.add_argument("--friction", type=float, default=0.7, help=friction)
     view.add_argument("--background", default="light", help="white, light or dark (default: light)")
     view.add_argument("--port", type=int, default=0, help="port of the page (default: a free port)")
     view.add_argument(
@@ -90,13 +77,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands.add_parser("recall", help="ask questions of lessons that you have worked through")
     lab = commands.add_parser("lab", help="open the course in JupyterLab")
-    lab.add_argument(
-        "folder",
-        nargs="?",
-        type=Path,
-        default=Path(),
-        help="your copy of the lessons (default: this folder)",
-    )
+    folder = "your copy of the lessons (default: this folder)"
+    lab.add_argument("folder", nargs="?", type=Path, default=Path(), help=folder)
     lab.usage = (
         "floatbase lab [FOLDER] [options of JupyterLab, such as --no-browser or --port=9000]"
     )
@@ -225,10 +207,8 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM; `given` are the arguments of the command line."""
-    from floatbase.playground import (
-        Playground,
-        Settings,
-    )  # imports MuJoCo and the viewer, which the other commands do not need
+    # imports MuJoCo and the viewer, which the other commands do not need
+    from floatbase.playground import Playground, Settings
 
     ended = threading.Event()
     before = {

@@ -253,14 +253,8 @@ class FlatFootContact(Value):
     corners: Array
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
     mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
-    row_names: ClassVar[tuple[str, ...]] = (
-        "x",
-        "y",
-        "z",
-        "angular x",
-        "angular y",
-        "angular z",
-    )  # world-aligned
+    # world-aligned
+    row_names: ClassVar[tuple[str, ...]] = "x", "y", "z", "angular x", "angular y", "angular z"
 
     def __post_init__(self) -> None:
         super().__post_init__()

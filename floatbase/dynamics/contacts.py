@@ -133,12 +133,8 @@ class Contacts(Value):
         UnknownNameError
             If `frames`, `mu` or `normals` has a name that does not exist.
         """
-        return Contacts(
-            [
-                _make_contact(*foot_data, flat=False)
-                for foot_data in _selected_feet(robot, frames, mu, normals)
-            ]
-        )
+        feet = _selected_feet(robot, frames, mu, normals)
+        return Contacts([_make_contact(*foot_data, flat=False) for foot_data in feet])
 
     @staticmethod
     def flat_feet(
@@ -211,9 +207,8 @@ class Contacts(Value):
                 f'fb.load_urdf(path, feet=["…"]), or name the frames in contact, '
                 f'fb.Contacts.points(robot, frames=["…"]). For free flight, use fb.Contacts.none().'
             )
-        return Contacts(
-            [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]
-        )
+        feet = _selected_feet(robot, None, mu, normals)
+        return Contacts([_make_contact(*foot_data) for foot_data in feet])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -297,11 +292,7 @@ class Contacts(Value):
         ndarray, shape (k, nv)
             Jacobian of the contact points in world axes; Jᵀ λ is the generalized contact force.
         """
-        as_instance("state", state, State)
-        t = as_number("t", t, "s")
-        return self._stacked(
-            state, [read_only(contact.jacobian(state, t)) for contact in self.items]
-        )
+        return self._jacobian_and_constraint(state, t)[0]
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """Compute the stacked rows A q̈ = b that the contacts impose on the motion.
@@ -324,30 +315,19 @@ class Contacts(Value):
         -----
         [FBR]_, eq. (5).
         """
-        as_instance("state", state, State)
-        t = as_number("t", t, "s")
-        parts = [tuple(map(read_only, contact.constraint(state, t))) for contact in self.items]
-        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-        return self._stacked(state, [part[0] for part in parts]), read_only(b)
+        return self._jacobian_and_constraint(state, t)[1:]
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
         """Compute J, A and b, evaluating each contact once where J equals A."""
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
-        A = self._stacked(state, [part[0] for part in parts])
-        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-        return (
-            A
-            if all(J is A for A, _, J in parts)
-            else self._stacked(state, [part[2] for part in parts]),
-            A,
-            read_only(b),
-        )
-
-    def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
-        """Stack rows of length nv; without contacts there are none."""
-        return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
+        none = np.zeros((0, state.robot.nv))
+        A = read_only(np.vstack([none, *(A for A, _, _ in parts)]))
+        b = read_only(np.concatenate([np.zeros(0), *(b for _, b, _ in parts)]))
+        if all(J is A for A, _, J in parts):
+            return A, A, b
+        return read_only(np.vstack([none, *(J for _, _, J in parts)])), A, b
 
     def force_slice(self, name: str) -> slice:
         """Return the slice of λ that belongs to one contact.
@@ -463,14 +443,9 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts(
-            [
-                *self.items,
-                *as_instance(
-                    "the right-hand side of Contacts + …", other, Contacts, "fb.Contacts([contact])"
-                ).items,
-            ]
-        )
+        example = "fb.Contacts([contact])"
+        as_instance("the right-hand side of Contacts + …", other, Contacts, example)
+        return Contacts([*self.items, *other.items])
 
     def __iter__(self) -> Iterator[MotionConstraint]:
         return iter(self.items)
@@ -538,11 +513,9 @@ def _selected_feet(
 ) -> list[tuple[Foot, float, Array]]:
     """Return the feet in contact, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
-    feet = (
-        robot.feet
-        if frames is None
-        else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
-    )
+    feet = robot.feet
+    if frames is not None:
+        feet = tuple(robot.foot(frame) for frame in as_strings("frames", frames))
     if not feet:
         raise InputError(
             f'{robot.name} has no feet. Name the frames in contact, frames=["…"]; robot.frames '
@@ -550,14 +523,8 @@ def _selected_feet(
         )
     names = [foot.frame for foot in feet]
     normals = UP if normals is None else normals
-    return list(
-        zip(
-            feet,
-            _per_name("mu", mu, names, DEFAULT_MU),
-            _per_name("normals", normals, names, UP, (3,)),
-            strict=True,
-        )
-    )
+    mus = _per_name("mu", mu, names, DEFAULT_MU)
+    return list(zip(feet, mus, _per_name("normals", normals, names, UP, (3,)), strict=True))
 
 
 def _per_name(
@@ -574,10 +541,8 @@ def _per_name(
             f"frames=[…]."
         )
     numeric = numeric_copy(value)
-    if (
-        not isinstance(value, Sequence | np.ndarray)
-        if numeric is None
-        else numeric.ndim == len(shape)
-    ):
+    is_list = isinstance(value, Sequence | np.ndarray)
+    is_one = not is_list if numeric is None else numeric.ndim == len(shape)
+    if is_one:
         return [value] * len(names)
     return list(as_array(argument, value, (len(names), *shape)))

@@ -33,7 +33,7 @@ _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
 # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
-_CONTACT_IMPEDANCE = (0.95, 0.99, 0.001, 0.5, 2.0)
+_CONTACT_IMPEDANCE = 0.95, 0.99, 0.001, 0.5, 2.0
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
 # s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
@@ -140,14 +140,9 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal)
     for x0, x1, y0, y1, top in ground.boxes:
-        half = 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            contype=1,
-            conaffinity=0,
-            pos=[x0 + half[0], y0 + half[1], top - half[2]],
-            size=half,
-        )
+        box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
+        centre = [x0 + half[0], y0 + half[1], top - half[2]]
+        spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
     for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
         _add_foot_balls(spec, foot, contact_of_foot.point_names)
@@ -189,8 +184,8 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         for body in bodies
         if body.joints or (robot.is_floating and body.parent.name == "world")
     }
-    consistent = {name: _is_physically_consistent(each) for name, each in inertias.items()}
-    inconsistent = [body for body in bodies if not consistent.get(body.name, True)]
+    moving = [body for body in bodies if body.name in inertias]
+    inconsistent = [b for b in moving if not _is_physically_consistent(inertias[b.name])]
     if inconsistent:
         raise SimulationError(_inertia_error(robot, inconsistent, inertias[inconsistent[0].name]))
     for body in bodies:
@@ -242,9 +237,8 @@ def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
         inertia.inertia = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
     for child in body.bodies:
         if not child.joints:
-            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(
-                _fused_inertia(child)
-            )
+            placement = pin.SE3(rotation_matrix(child.quat), np.array(child.pos))
+            inertia = inertia + placement.act(_fused_inertia(child))
     return inertia
 
 
@@ -266,10 +260,9 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     weld = f", or weld such links to their parents with locked={joints} of fb.load"
     return (
         f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}. Together with the "
-        f"links welded to it, it has "
-        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} "
-        f"kg m². All of these must be positive, and no principal inertia may exceed the sum of the "
-        f"other two. Correct the URDF{weld if joints else ''}."
+        f"links welded to it, it has {inertia.mass:.4g} kg and principal inertias {smallest:.4g}, "
+        f"{middle:.4g}, {largest:.4g} kg m². All of these must be positive, and no principal "
+        f"inertia may exceed the sum of the other two. Correct the URDF{weld if joints else ''}."
     )
 
 

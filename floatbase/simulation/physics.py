@@ -114,9 +114,8 @@ class Simulation:
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
         self._foot_contacts = FootContacts(self.model, self.ground, self.point_names)
-        self._planes = list(
-            zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
-        )
+        normals, offsets = self.ground.normals.tolist(), self.ground.offsets.tolist()
+        self._planes = list(zip(normals, offsets, strict=True))
         # the hulls are the only meshes; a body that has a foot can always touch
         self._hull_geoms = np.flatnonzero(self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
         self._hull_bodies = np.setdiff1d(
@@ -233,10 +232,8 @@ class Simulation:
         """Whether a floating base lost 60 % of its height or tilted by 60° since the last reset."""
         if not self.robot.is_floating:
             return False
-        sunk = (
-            self._start_height - self._base_height()
-            > (1.0 - FALLEN_HEIGHT_FRACTION) * self._nominal_height
-        )
+        largest_drop = (1.0 - FALLEN_HEIGHT_FRACTION) * self._nominal_height
+        sunk = self._start_height - self._base_height() > largest_drop
         return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < FALLEN_COSINE
 
     @property
@@ -297,9 +294,8 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
         self._start_height = self._nominal_height = self._base_height()
         self._start_vertical = self._base_vertical.tolist()
-        if (
-            self._nominal_height <= _MIN_INITIAL_HEIGHT
-        ):  # it lies on the ground: measure a fall by the distance to the centre of mass
+        if self._nominal_height <= _MIN_INITIAL_HEIGHT:
+            # it lies on the ground: measure a fall by the distance to the centre of mass
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
 
     @contextmanager
@@ -469,14 +465,11 @@ class Simulation:
             return int(self.model.joint(joint).bodyid[0])
         if self.robot.is_floating:
             return self._base_body
-        moving = ", ".join(
-            f.name
-            for f in self.robot.model.frames
-            if f.parentJoint > 0 and f.type == pin.FrameType.BODY
-        )
+        links = [f for f in self.robot.model.frames if f.type == pin.FrameType.BODY]
         raise InputError(
             f"A push at {push.frame!r} has no effect, because {self.robot.name} is fixed to the "
-            f"ground there. Push a link that moves: {moving}."
+            f"ground there. Push a link that moves: "
+            f"{', '.join(link.name for link in links if link.parentJoint > 0)}."
         )
 
     def page_data(self) -> dict[str, Any]:
