@@ -21,11 +21,8 @@ from floatbase.lessons.lessonX import (
     faultless_cases,
     ground_normal,
     judge_line,
-    lagged,
     random_cases,
     record_box,
-    required_forces,
-    sliding_friction_ratios,
 )
 
 # --seed takes others; 0 to 41 were tried by hand: in all 336 boxes the program was right
@@ -45,12 +42,6 @@ def program():
 def cases(seed):
     drawn = random_cases(seed) + faultless_cases(seed)
     return tuple(zip(drawn, black_boxes(seed) + faultless_boxes(seed), strict=True))
-
-
-@cache
-def missing_forces(seed):
-    """What (7) needs besides the measured forces, for each case."""
-    return tuple(required_forces(box) for _, box in cases(seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -112,27 +103,6 @@ def test_the_assumed_normal_is_wrong_only_if_it_is_the_fault():
         off = np.rad2deg(np.arccos(min(1.0, ground_normal(box) @ box.contacts.normals[0])))
         fault = case.injected_fault
         assert off == pytest.approx(fault.size if fault.kind == "normal" else 0.0, abs=0.2)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_evidence_against_a_wrong_diagnosis_is_true(seed):
-    for (case, box), forces in zip(cases(seed)[:6], missing_forces(seed), strict=False):
-        fault, normal = case.injected_fault.kind, ground_normal(box)
-        if fault != "friction":
-            assert np.percentile([1.2, *sliding_friction_ratios(box, normal)], 90) > 1.15
-        early = range(5, min(len(box), 60), 5)
-        plans = [box.equations(i).residual(box.qdd[i], box.tau[i], box.planned[i]) for i in early]
-        drifts = [np.abs(box.equations(i).b).max() for i in early]
-        lost = np.median([np.abs(plan[1]).max() / b for plan, b in zip(plans, drifts, strict=True)])
-        assert (max(np.abs(plan[0]).max() for plan in plans) > 1.0) == (fault == "mass")
-        assert lost > 0.99 if fault == "drift" else lost < 0.01
-        got, told = forces[:, 6:], box.tau[:-1]
-        lags = [lagged(told, 0.002, ms) - got for ms in range(0, 120, 2)]
-        late = [np.median(np.abs(lag), axis=0).max() for lag in lags]
-        if fault == "swapped motors":
-            assert min(late) > 0.5
-        elif fault != "slow motors":
-            assert late[0] < 0.5
 
 
 def test_a_forgotten_drift_fells_the_robot():
