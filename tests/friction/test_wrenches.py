@@ -312,13 +312,8 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
 def test_too_steep_a_slope_carries_nothing():
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
-        region = of(
-            [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]],
-            normals,
-            0.4,
-            4,
-            inside=False,
-        ).support_region()
+        points = [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]]
+        region = of(points, normals, 0.4, inside=False).support_region()
         assert region.shape == ((3, 2) if stands else (0, 2))
 
 
@@ -365,20 +360,11 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused():
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
-        (
-            lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix,
-            "face_matrix",
-            "max_normal_force",
-        ),
+        (lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix, "face_matrix"),
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),
         (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
         (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
         (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
-        (
-            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
-            "cones",
-            "FrictionPolyhedron",
-            2,
-        ),
+        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "cones", 2),
     ):
         refused(call, InputError, *named)
