@@ -17,7 +17,7 @@ from floatbase.objectives import centroidal_inertia
 
 PERIOD = 2e-3
 KINDS = ("solo8", "go2", "anymal_kinova", "talos")
-STANDING = judges.sampled(KINDS, "solo8", "talos")
+STANDING = judges.sampled(KINDS, "solo8")
 
 
 @cache
