@@ -18,12 +18,7 @@ from messages import refused
 
 import floatbase as fb
 from floatbase import dynamics, objectives
-from floatbase.dynamics import (
-    LinearConstraint,
-    RollingWheel,
-    fixed_frame,
-    moving_frame,
-)
+from floatbase.dynamics import LinearConstraint, RollingWheel, fixed_frame, moving_frame
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
@@ -198,7 +193,7 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time():
 # the wheel ----------------------------------------------------------------------------------------
 
 
-def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart):
+def test_b_of_a_wheel_and_of_bolts_is_minus_the_change_of_their_rows_along_the_motion(cart):
     """Eq. (6) by central differences of J(q) v with fixed v, at random states on slopes."""
     rng = np.random.default_rng(0)
     for seed in range(20):
@@ -206,11 +201,12 @@ def test_b_of_a_wheel_is_minus_the_change_of_its_rows_along_the_motion(cart):
         state = fb.State(cart, q, rng.normal(size=cart.nv))
         normal = judges.random_normals(1, seed)[0]
         wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal)
-        A, b = wheel.constraint(state)
-        expected = -judges.derivative(lambda s, w=wheel: w.jacobian(s) @ s.v, state, state.v)
-        assert np.linalg.norm(expected) > 1e-2
-        assert np.allclose(b, expected, atol=1e-7)
-        assert np.array_equal(A, wheel.jacobian(state))
+        for each in (wheel, fixed_frame("body")):
+            A, b = each.constraint(state)
+            expected = -judges.derivative(lambda s, c=each: c.jacobian(s) @ s.v, state, state.v)
+            assert np.linalg.norm(expected) > 1e-2
+            assert np.allclose(b, expected, atol=1e-7)
+            assert np.array_equal(A, each.jacobian(state))
 
 
 def test_the_slip_is_the_velocity_of_the_wheels_material_point_at_the_contact(cart):
