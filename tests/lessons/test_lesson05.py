@@ -8,8 +8,10 @@ import floatbase as fb
 from floatbase.control import AnalyticController
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson05 import (
+    com_in_base,
     friction_ratios,
     moving_and_goal_state,
+    stretched_arm_state,
 )
 from floatbase.objectives import com_wrench_map
 
@@ -35,3 +37,9 @@ def test_a_friction_ratio_is_tangential_over_normal_force(normal):
     np.testing.assert_allclose(
         friction_ratios(contacts, np.ravel(forces)), [0.5, 0.0, np.inf, np.inf], atol=ROUNDING
     )
+
+
+def test_the_centre_of_mass_is_that_of_the_state_in_the_frame_of_the_base():
+    state = stretched_arm_state(1.0)
+    expected = state.frame_pose("base").inverse().act(state.com)
+    np.testing.assert_allclose(com_in_base(state), expected, atol=ROUNDING)

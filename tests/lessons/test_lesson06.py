@@ -7,10 +7,7 @@ import pytest
 import floatbase as fb
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
-from floatbase.lessons.lesson06 import (
-    constrained_minimiser,
-    state_with_feet_at,
-)
+from floatbase.lessons.lesson06 import constrained_minimiser, state_with_feet_at
 
 UP = np.array([0.0, 0.0, 1.0])
 LENGTHS = 1e-9  # m: what Newton's method leaves, and rounding

@@ -8,11 +8,7 @@ import numpy as np
 import floatbase as fb
 from floatbase.friction import contact_wrench, wrench_set
 from floatbase.lessons import all_exercises
-from floatbase.lessons.lesson09 import (
-    corner_forces,
-    load_talos,
-    run_lean,
-)
+from floatbase.lessons.lesson09 import corner_forces, load_talos, run_lean
 
 TALOS = load_talos()
 STATE = TALOS.standing()
