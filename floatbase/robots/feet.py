@@ -229,7 +229,7 @@ def _shapes_of(
     return [
         shape
         for shape in shapes
-        if _link_of(model, shape) not in incomplete and len(shape_points(shape.geometry))
+        if _link_of(model, shape) not in incomplete and np.ptp(shape_points(shape.geometry)) > 0.0
     ]
 
 
@@ -261,7 +261,7 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
     for link in links if n_joints >= _SOLE_JOINTS else ():
         link_frame = model.getFrameId(link, pin.BODY)
         if straight.oMf[link_frame].rotation[2, 2] > _MIN_UPRIGHT:
-            corners = _sole(model.frames[link_frame].placement.inverse(), own)
+            corners = _sole(model.frames[link_frame].placement.inverse(), on_joint)
             if corners is not None:
                 return Foot(link, corners=corners)
     lowest = min(own, key=lambda shape: float(_points(world, shape)[:, 2].min()))

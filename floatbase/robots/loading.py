@@ -379,7 +379,7 @@ def load_mjcf(
         package_dirs=(mjcf.folder,),
     )
     messages = (
-        [f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."]
+        [f"{name} is loaded from its MJCF {', '.join(mjcf.differences)}."]
         if mjcf.differences
         else []
     )

@@ -26,7 +26,7 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
     }
     for seed in range(_N_STATES):
         state = robot.random_state(seed)
-        M, h = _dynamics(data, conversion, state)
+        M, h = dynamics(data, conversion, state)
         different = [
             name
             for name, (theirs, ours) in {**pairs, "M": (M, state.M), "h": (h, state.h)}.items()
@@ -42,7 +42,7 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
             )
 
 
-def _dynamics(data: mujoco.MjData, conversion: Conversion, state: State) -> tuple[Array, Array]:
+def dynamics(data: mujoco.MjData, conversion: Conversion, state: State) -> tuple[Array, Array]:
     """Move MuJoCo's robot to a state, and return its M and h in the package's convention."""
     model, nv = data.model, state.robot.nv
     data.qpos[:], data.qvel[:] = conversion.to_mujoco(state.q, state.v)
