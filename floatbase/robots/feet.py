@@ -29,7 +29,9 @@ _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_CROUCH = 0.05  # of a leg's height: by how much bent legs are shorter than straight ones
+# of a leg's height: by how much bent legs on soles and on balls are shorter than straight ones.
+# `Walk` makes no steps with a leg on a ball that is less than 0.1 shorter
+_CROUCH_ON_SOLES, _CROUCH = 0.05, 0.2
 _KICK = 0.3  # rad or m: first change of the joints of a straight leg, which shows how it bends
 _NEARNESS = 1e-3  # weight of the joints' distance from the given posture: m per rad
 _MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull of `_NEARNESS`
@@ -178,9 +180,10 @@ def _bent_posture(robot: Robot) -> Array | None:
 
     now, straight = feet(start), feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
     top = max(data.oMi[i].translation[2] for i in legs)
+    crouches = [_CROUCH_ON_SOLES if foot.is_flat else _CROUCH for foot in robot.feet]
     targets = [
-        np.array([x, y, max(z + _CROUCH * (top - z), present[2])])
-        for ((x, y, z), _), (present, _) in zip(straight, now, strict=True)
+        np.array([x, y, max(z + crouch * (top - z), present[2])])
+        for crouch, ((x, y, z), _), (present, _) in zip(crouches, straight, now, strict=True)
     ]
 
     def errors(x: Array) -> Array:
