@@ -95,9 +95,11 @@ def test_a_marker_at_a_sole_does_not_hide_the_sole(size):
         assert corners == {(x, y) for x, y, _ in SOLE}
 
 
-def test_a_quadruped_bends_its_legs_far_enough_to_walk():
+@pytest.mark.parametrize("kind", ["revolute", "continuous"])
+def test_a_quadruped_bends_its_legs_far_enough_to_walk(kind):
     solo12 = fb.load("solo12")
-    robot = fb.load_urdf(solo12.urdf, package_dirs=solo12.package_dirs)
+    urdf = solo12.urdf.replace('"revolute"', f'"{kind}"')
+    robot = fb.load_urdf(urdf, package_dirs=solo12.package_dirs)
     walk = Walk(robot, fb.Contacts.feet(robot), Gait.trot(robot), (0.2, 0.0))
     walk(robot.standing().q, np.zeros(robot.nv), 0.0)
     assert walk.speed_fraction == 1.0
