@@ -17,7 +17,7 @@ example-robot-data are not listed. See [Your own robot](your_own_robot.md).
   alone in its MJCF is compared with the file, without what a warning names. Any other robot is
   compared with its simulation.
 - **stands** is how far the centre of mass is from its place after 1 s. For a robot with a fixed
-  base, it is the largest error of a joint.
+  base, it is the norm of the errors of all joints.
 - **push** gives the largest and the last distance of the centre of mass in the 2 s after the
   beginning of a push. The push is 2 N per kilogram of mass and lasts 0.1 s.
 - **force / weight** is the planned vertical force at rest, as a fraction of the weight.
