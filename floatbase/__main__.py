@@ -157,7 +157,7 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     described: dict[str, Any] = {
         "feet": options.feet,
         "foot_radius": options.foot_radius,
-        "posture": _posture(options.posture),
+        "posture": _posture(options.posture, options.robot),
     }
     if options.fixed:
         described["floating"] = False
@@ -166,9 +166,10 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     return fb.load(options.robot, **described)
 
 
-def _posture(entries: Sequence[str]) -> dict[str, float] | str | None:
+def _posture(entries: Sequence[str], robot: str) -> dict[str, float] | str | None:
     """Return joint positions given as JOINT=ANGLE, the name of a keyframe, or None by default."""
-    if len(entries) == 1 and "=" not in entries[0]:
+    is_mjcf = robot.lower().endswith((".xml", ".mjcf"))
+    if is_mjcf and len(entries) == 1 and "=" not in entries[0]:
         return entries[0]
     angles = {}
     for entry in entries:

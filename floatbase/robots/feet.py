@@ -30,7 +30,9 @@ _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_CROUCH = 0.05  # of a leg's height: by how much bent legs are shorter than straight ones
+# of a leg's height: by how much bent legs on soles and on balls are shorter than straight ones.
+# `Walk` makes no steps with a leg on a ball that is less than 0.1 shorter
+_CROUCH_ON_SOLES, _CROUCH = 0.05, 0.2
 _KICK = 0.3  # rad or m: first change of the joints of a straight leg, which shows how it bends
 _NEARNESS = 1e-3  # weight of the joints' distance from the given posture: m per rad
 _MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull of `_NEARNESS`
@@ -180,7 +182,8 @@ def _bent_posture(robot: Robot) -> Array | None:
     now, _ = feet(start)
     targets, _ = feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
     top, z = max(data.oMi[i].translation[2] for i in legs), targets[:, 2]
-    targets[:, 2] = np.maximum(z + _CROUCH * (top - z), now[:, 2])
+    crouch = np.array([_CROUCH_ON_SOLES if foot.is_flat else _CROUCH for foot in robot.feet])
+    targets[:, 2] = np.maximum(z + crouch * (top - z), now[:, 2])
 
     def errors(x: Array) -> Array:
         middles, tilts = feet(bend(x))
@@ -248,7 +251,7 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
     for link in links if n_joints >= _SOLE_JOINTS else ():
         link_frame = model.getFrameId(link, pin.BODY)
         if straight.oMf[link_frame].rotation[2, 2] > _MIN_UPRIGHT:
-            corners = _sole(model.frames[link_frame].placement.inverse(), own)
+            corners = _sole(model.frames[link_frame].placement.inverse(), on_joint)
             if corners is not None:
                 return Foot(link, corners=corners)
     lowest = min(own, key=lambda shape: float(placed_points(shape, world)[:, 2].min()))

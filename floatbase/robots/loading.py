@@ -351,7 +351,7 @@ def load_mjcf(
     keyframe = posture if isinstance(posture, str) else None
     mjcf = read_mjcf(name, file, floating, keyframe)
     if mjcf.differences:
-        _warn(f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}.")
+        _warn(f"{name} is loaded from its MJCF {', '.join(mjcf.differences)}.")
     return _make_robot(
         name,
         mjcf.urdf,
@@ -414,10 +414,10 @@ def _make_robot(
         kept_joints = [
             full_model.joints[full_model.getJointId(joint)] for joint in list(model.names)[1:]
         ]
-        posture = np.concatenate([q[joint.idx_q :][: joint.nq] for joint in kept_joints])
-        model.armature = np.concatenate(
-            [full_model.armature[joint.idx_v :][: joint.nv] for joint in kept_joints]
-        )
+        positions = (q[joint.idx_q :][: joint.nq] for joint in kept_joints)
+        armatures = (full_model.armature[joint.idx_v :][: joint.nv] for joint in kept_joints)
+        posture = np.concatenate([[], *positions])  # none if all joints of an arm are locked
+        model.armature = np.concatenate([[], *armatures])
     check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]

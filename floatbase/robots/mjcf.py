@@ -392,6 +392,14 @@ class _Writer:
             "without tendons": self._labels("tendon", range(model.ntendon)),
             "without other moving bodies": self._labels("body", others),
             "without springs": self._labels("joint", joints[model.jnt_stiffness[joints] != 0.0]),
+            "without the armature of free joints": self._labels(
+                "joint",
+                [
+                    model.body_jntadr[root]
+                    for root in self.free
+                    if self._is_of_robot(root) and model.dof_armature[model.body_dofadr[root]]
+                ],
+            ),
             "without gravity compensation": self._labels(
                 "body", bodies[model.body_gravcomp[bodies] != 0]
             ),

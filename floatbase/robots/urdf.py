@@ -108,6 +108,11 @@ def normalize_urdf(name: str, text: str, floating: bool) -> str:
 
 def _parse_xml(name: str, text: str) -> Element:
     """Return the outermost element of a URDF; other formats are an `InputError`."""
+    # other readers accept prefixes that are not declared, such as drake:acceleration
+    prefixes = set(re.findall(r"[\s</]([A-Za-z_][\w.-]*):[A-Za-z_]", text))
+    prefixes -= {"xml", "xmlns", *re.findall(r"xmlns:([\w.-]+)", text)}
+    declarations = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(prefixes))
+    text = re.sub(r"<robot(?=\s)", f"<robot{declarations}", text, count=1)
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:

@@ -9,6 +9,7 @@ import pytest
 from messages import raises, warns
 
 import floatbase as fb
+from floatbase.behaviours import Gait, Walk
 from floatbase.errors import InputError, RobotWarning, UnknownNameError
 from floatbase.robots import Foot
 
@@ -79,6 +80,30 @@ def test_soles_are_found_in_the_collision_shapes(foot, feet, tmp_path):
     assert [foot.frame for foot in robot.feet] == ["L_foot", "R_foot"]
     for sole in robot.feet:
         assert set(map(tuple, sole.corners.round(9).tolist())) == SOLE
+
+
+@pytest.mark.parametrize("size", ["0.001 0.001 0.001", "0 0 0"])
+def test_a_marker_at_a_sole_does_not_hide_the_sole(size):
+    markers = "".join(
+        f'<link name="{side}_marker"><collision><geometry><box size="{size}"/></geometry>'
+        f'</collision></link><joint name="{side}_at" type="fixed"><parent link="{side}_foot"/>'
+        f'<child link="{side}_marker"/><origin xyz="0 0 -0.035"/></joint>'
+        for side in "LR"
+    )
+    robot = fb.load_urdf(biped(BOX).replace("</robot>", markers + "</robot>"))
+    for foot in robot.feet:
+        corners = {tuple(corner) for corner in foot.corners[:, :2].round(3)}
+        assert corners == {(x, y) for x, y, _ in SOLE}
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous"])
+def test_a_quadruped_bends_its_legs_far_enough_to_walk(kind):
+    solo12 = fb.load("solo12")
+    urdf = solo12.urdf.replace('"revolute"', f'"{kind}"')
+    robot = fb.load_urdf(urdf, package_dirs=solo12.package_dirs)
+    walk = Walk(robot, fb.Contacts.feet(robot), Gait.trot(robot), (0.2, 0.0))
+    walk(robot.standing().q, np.zeros(robot.nv), 0.0)
+    assert walk.speed_fraction == 1.0
 
 
 @pytest.mark.parametrize("name", ["hyq", "anymal_kinova", "g1"])

@@ -197,6 +197,7 @@ def test_the_robot_is_the_free_body_with_joints_or_what_is_attached_to_the_world
         (pendulum(rest='<option gravity="0 0 -1.6"/>'), -1.6),
         (pendulum(rest='<option><flag gravity="disable"/></option>'), 9.81),
         (pendulum('<joint name="swing" stiffness="3"/>'), "swing"),
+        (pendulum('<joint name="loose" type="free" armature="1"/>'), "loose"),
         (pendulum(rest='<equality><weld name="bolt" body1="link"/></equality>'), "bolt"),
         (
             pendulum(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
-from math import pi, sqrt
+from math import atan2, cos, pi, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -136,7 +136,8 @@ def _leg_reach(state: State, foot: str, direction: Array) -> float:
     The result is the smaller of the two distances from the foot's place in the standing posture.
     """
     root = leg_joints(state.robot, foot)[-1]
-    leg = state.point(foot) - state.joint_transforms[root][:3, 3]
+    centre = state.point(foot, state.robot.foot(foot).centre)
+    leg = centre - state.joint_transforms[root][:3, 3]
     along = abs(float(leg[:2] @ direction))
     square = _leg_length(state.robot, foot) ** 2 - float(leg @ leg) + along**2
     return sqrt(max(square, 0.0)) - along
@@ -170,21 +171,27 @@ def _longest_leg(robot: Robot, foot: str, limits: Mapping[int, tuple[float, floa
     """
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id(foot)
     leg, q = leg_joints(robot, foot), np.array(robot.standing().q)
+    centre = np.array(robot.foot(foot).centre)
 
-    def distance(i: int, position: float) -> float:
-        q[i] = position
+    def distance(joint: int, position: float) -> float:
+        place(joint, position)
         pin.forwardKinematics(model, data, q)
-        place = pin.updateFramePlacement(model, data, frame).translation
-        return float(np.linalg.norm(place - data.oMi[leg[-1]].translation))
+        end = pin.updateFramePlacement(model, data, frame).act(centre)
+        return float(np.linalg.norm(end - data.oMi[leg[-1]].translation))
+
+    def place(joint: int, position: float) -> None:
+        is_unlimited = model.nqs[joint] == 2  # stored as (cos, sin)
+        values = (cos(position), sin(position)) if is_unlimited else position
+        q[model.idx_qs[joint] :][: model.nqs[joint]] = values
 
     longest = 0.0
     for joint in leg * _SWEEPS:
-        i = model.idx_qs[joint]
-        if model.nqs[joint] > 1:  # (cos, sin) of a joint without limits
-            continue
-        lower, upper = limits.get(joint, (q[i] - pi, q[i] + pi))
-        positions = [q[i], *np.linspace(max(lower, q[i] - pi), min(upper, q[i] + pi), _GRID_SIZE)]
-        longest, q[i] = max((distance(i, position), position) for position in positions)
+        now = q[model.idx_qs[joint] :][: model.nqs[joint]]
+        x = float(now[0]) if len(now) == 1 else atan2(now[1], now[0])
+        lower, upper = limits.get(joint, (x - pi, x + pi))
+        positions = [x, *np.linspace(max(lower, x - pi), min(upper, x + pi), _GRID_SIZE)]
+        longest, best = max((distance(joint, position), position) for position in positions)
+        place(joint, best)
     return longest
 
 
