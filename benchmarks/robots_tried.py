@@ -70,13 +70,11 @@ def found(folder: str | None) -> Iterator[tuple[str, str, str | None, dict[str, 
             yield title, end, next(matching, None), arguments
 
 
-def kind_of(robot: fb.Robot, foot: Foot) -> str:
+def kind_of(foot: Foot) -> str:
     """Return whether a foot is a sole, a wheel, a ball or a point."""
-    frame = robot.model.frames[robot.frame_id(foot.frame)]
-    lever = np.linalg.norm(frame.placement.act(foot.centre))
-    if robot.model.nqs[frame.parentJoint] == 2 and lever < 2.0 * foot.radius:
-        return "wheel"  # a joint without limits turns it about its centre
-    return "sole" if foot.is_flat else "ball" if foot.radius else "point"
+    if foot.is_flat:
+        return "sole"
+    return "wheel" if foot.axis is not None else "ball" if foot.radius else "point"
 
 
 def difference(robot: fb.Robot, path: str) -> float:
@@ -139,7 +137,7 @@ def attempt(path: str, arguments: dict[str, Any]) -> tuple[list[str], bool]:
         given = ", ".join(f"`{name}={value}`" for name, value in arguments.items())
         cells += [f"{robot.mass:.3g} kg", str(robot.d), given or "none"]
         cells.append(f"{difference(robot, path):.0e}")
-        kinds = Counter(kind_of(robot, foot) for foot in robot.feet)
+        kinds = Counter(kind_of(foot) for foot in robot.feet)
         cells.append(", ".join(f"{n} {kind}{'s' * (n > 1)}" for kind, n in kinds.items()))
         results, works = stand(robot)
         cells += results
