@@ -20,7 +20,7 @@ from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
-from floatbase.robots.feet import as_feet, with_bent_legs
+from floatbase.robots.feet import as_feet, with_bent_legs, with_foot_links
 from floatbase.robots.plausibility import missing_meshes_message, passive_joints_message, problems
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
@@ -424,6 +424,8 @@ def _make_robot(
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
     posture = as_posture(name, model, posture)
     found = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    if known_feet is None:
+        urdf, found = with_foot_links(model, urdf, found)
     robot = Robot(name, model, urdf, package_dirs, found, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
     if choose_posture and bend_legs:
         robot = with_bent_legs(robot)

@@ -218,3 +218,20 @@ def test_a_foot_answers_with_its_points():
     ball, sole = Foot("toe", 0.02, [0.0, 0.0, 0.1]), Foot("sole", corners=np.eye(3))
     assert ball.points.tolist() == [[0.0, 0.0, 0.1]] and not ball.is_flat
     assert sole.points.tolist() == np.eye(3).tolist() and sole.is_flat
+
+
+def test_a_ball_far_from_the_origin_of_its_link_has_a_frame_of_its_own_which_swings_move():
+    ball = BALLS.split("</collision>")[0] + "</collision>"
+    ball = ball.replace("0.12 0.03 -0.03", "0.1 0 -0.2").replace("0.005", "0.02")
+    robot = fb.load_urdf(biped(ball), posture={"*knee*": 0.5})
+    named = fb.load_urdf(
+        biped(ball), posture={"*knee*": 0.5}, feet=["L_foot", Foot("R_foot", 0.02, [0.1, 0, -0.2])]
+    )
+    assert [foot.frame for foot in robot.feet] == ["L_foot foot", "R_foot foot"]
+    assert [foot.frame for foot in named.feet] == [foot.frame for foot in robot.feet]
+    state, data = robot.standing(), fb.Simulation(robot)
+    for foot in robot.feet:
+        link = state.frame_pose(foot.frame.removesuffix(" foot"))
+        assert np.allclose(state.point(foot.frame), link.act(np.array([0.1, 0.0, -0.2])))
+        assert state.point(foot.frame)[2] == pytest.approx(0.02)
+        assert foot.frame in [data.model.body(i).name for i in range(data.model.nbody)]
