@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,11 @@ def load(
 
     name = str(name) if isinstance(name, Path) else name
     load_file = _file_loader(name)
+    known = signature(load_file).parameters if load_file else ()
+    unknown = [option for option in file_options if option not in known]
+    if unknown:
+        kind = f"fb.{load_file.__name__}" if load_file else "A robot that is loaded by its name"
+        raise InputError(f"{kind} has no option {', '.join(unknown)}. Leave it out.")
     if load_file is not None:
         return load_file(
             name,
@@ -128,10 +134,6 @@ def load(
             posture=posture,
             locked=locked,
             **file_options,
-        )
-    if file_options:
-        raise InputError(
-            f"{', '.join(file_options)}: only robots from a file have these options, not {name}."
         )
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))

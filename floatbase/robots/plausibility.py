@@ -15,8 +15,8 @@ from floatbase.robots.feet import singular_legs
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
-# kg/m³, mass over the cube of the robot's size: robots have 10 to 200, and air has 1.2. In
-# centimetres it is a millionth, and in inches a 60 000th.
+# kg/m³, mass over the cube of the robot's size: robots have 10 to 200, and air has 1.2.
+# With lengths in centimetres it would be a millionth, and in inches a 60 000th.
 _MIN_DENSITY = 0.01
 # of the forces and moments that balance the robot, relative to the largest fraction of a torque
 # limit; and of the forces themselves, which makes them unique
@@ -73,8 +73,8 @@ def missing_meshes_message(robot: Robot) -> str:
         return ""
     more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
     return (
-        f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Its link is "
-        f"represented by other shapes or a box. Give the folder that contains the meshes or "
+        f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Links "
+        f"without their meshes are drawn as other shapes or boxes. Pass the folder that contains the meshes or "
         f"their package, as in package_dirs=[…]."
     )
 
@@ -86,14 +86,14 @@ def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
         return ""
     names = [foot.frame for foot in robot.feet]
     advice = (
-        f"If it has soles, give their corners, as in "
+        f"If it has soles, pass their corners, as in "
         f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
         if robot.feet[0].axis is None
-        else "Its wheels must move to balance it, which no task of floatbase does."
+        else "Its wheels must move to balance it, and floatbase has no task for this."
     )
     return (
-        f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
-        f"point(s) only: {', '.join(names)}. {advice}"
+        f"{robot.name} cannot stand still, because it touches the ground only at "
+        f"{' and '.join(names)}. {advice}"
     )
 
 
@@ -178,7 +178,7 @@ def _weak_motors_message(robot: Robot) -> str:
         return ""
     return (
         f"{robot.name} cannot stand: its motors are too weak to carry it on its feet (N·m or N): "
-        f"{weak}. Check masses, lengths and the effort of the joints in the URDF, or "
+        f"{weak}. Check masses, lengths and the torque limits of the joints in the file, or "
         f"pass torque_limits."
     )
 

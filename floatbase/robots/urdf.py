@@ -53,7 +53,7 @@ _NUMBERS = {
 _REQUIRED = {"joint": ("parent", "child"), "inertial": ("mass", "inertia")}
 # attributes with a default; all other attributes of an element are required
 _OPTIONAL = ("xyz", "rpy", "lower", "upper", "damping", "friction", "multiplier", "offset", "scale")
-# what all readers take for the same number; Python's float() accepts more, such as 1_000
+# what all readers read as the same number; Python's float() accepts more, such as 1_000
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _INFINITY = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 _XACRO = "Run xacro first, as in `xacro robot.urdf.xacro > robot.urdf` (`pip install xacro`)."
@@ -74,7 +74,7 @@ def read_text(path: Path) -> str:
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF or "
+            f"The file {path.absolute()} cannot be read ({reason}). Pass the path of a URDF or "
             f"MJCF file."
         ) from None
 
@@ -124,7 +124,7 @@ def _parse_xml(name: str, text: str) -> Element:
     for element in root.iter():
         element.tag = element.tag.removeprefix(namespace)
     if root.tag != "robot":
-        hint = _OTHER_FORMATS.get(root.tag, "Give the path of a URDF file.")
+        hint = _OTHER_FORMATS.get(root.tag, "Pass the path of a URDF file.")
         raise InputError(
             f"{name} is not a URDF: its outermost element is <{root.tag}>, but it must be <robot>. "
             f"{hint}"
@@ -183,7 +183,7 @@ def _normalize_numbers(element: Element, where: str) -> None:
 
 
 def _is_number(word: str, tag: str) -> bool:
-    """Return whether all readers take a word for the same valid number."""
+    """Return whether all readers read a word as the same valid number."""
     if tag == "limit" and _INFINITY.fullmatch(word):
         return True
     is_finite = _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
@@ -197,11 +197,11 @@ def _check_tree(name: str, root: Element) -> str:
         for label, count in names.items():
             if count > 1 or not label:
                 raise InputError(
-                    f"{kind}s of {name} with the name {label!r}: {count}. Give each its own name."
+                    f"{name} has {count} {kind}s with the name {label!r}. Each needs a name of its own."
                 )
     links = [link.get("name", "") for link in root.findall("link")]
     if not links:
-        raise InputError(f"{name} has no <link>. Give the path of a URDF file with links.")
+        raise InputError(f"{name} has no <link>. Pass the path of a URDF file with links.")
     parents = {link: dict[str, str]() for link in links}  # of each link, by the joint between them
     for joint in root.findall("joint"):
         label, (parent, child) = joint.get("name", ""), _ends(joint)
