@@ -50,6 +50,7 @@ def catalogue() -> dict[str, str]:
 
 def load(
     name: str | Path,
+    /,
     *,
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
@@ -166,10 +167,11 @@ def _file_loader(path: str) -> Callable[..., Robot] | None:
     endings = *_FILE_ENDINGS, ".xacro", ".sdf"  # of these, load_urdf says what to run first
     if not isinstance(path, str) or not path.lower().endswith(endings):
         return None
+    text = read_text(Path(os.path.expanduser(path)))
     try:
-        tag = ElementTree.fromstring(read_text(Path(os.path.expanduser(path)))).tag
-    except ElementTree.ParseError:
-        tag = ""  # load_urdf describes the error
+        tag = ElementTree.fromstring(text).tag
+    except ElementTree.ParseError:  # the function that loads the file describes the error
+        tag = "mujoco" if "<mujoco" in text and "<robot" not in text else ""
     return load_mjcf if tag == "mujoco" else load_urdf
 
 

@@ -10,6 +10,7 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.qp import QP, solve
+from floatbase.robots._checks import joint_limits
 from floatbase.robots._shapes import missing_meshes
 from floatbase.robots.feet import singular_legs
 from floatbase.robots.robot import Foot, Robot
@@ -21,6 +22,7 @@ _MIN_DENSITY = 0.01
 # of the forces and moments that balance the robot, relative to the largest fraction of a torque
 # limit; and of the forces themselves, which makes them unique
 _BALANCE_WEIGHT, _FORCE_WEIGHT = 1e6, 1e-6
+_MANY_TURNS = 30.0  # rad: solo12 has 20, and hardly a joint turns by only 30 degrees
 _TOLERANCE = 1e-2  # fraction of a torque limit by which the torques of the QP may be wrong
 
 
@@ -38,6 +40,7 @@ def problems(robot: Robot, given_feet: Sequence[str | Foot], may_bend: bool) -> 
         or _upside_down_message(robot, posture)
         or _weak_motors_message(robot),
         _points_message(robot, given_feet),
+        _degrees_message(robot),
     ]
 
 
@@ -51,6 +54,17 @@ def _straight_legs_message(robot: Robot) -> str:
         f"posture, for example straight. They cannot move their feet in all directions. Pass a "
         f'posture with bent legs, such as posture={{"name of a knee": 0.6}}, or the positions of '
         f"all joints."
+    )
+
+
+def _degrees_message(robot: Robot) -> str:
+    """Return a warning if most joints can turn so far that their limits are in degrees, else ""."""
+    _, _, lower, upper = joint_limits(robot.model)
+    if not _MANY_TURNS < np.median(np.append(upper - lower, 0.0)) < 2 * 360:
+        return ""
+    return (
+        f"Most joints of {robot.name} can turn by many turns. Their limits are probably in "
+        f"degrees. Write them in radians, and check the velocities."
     )
 
 
@@ -74,8 +88,8 @@ def missing_meshes_message(robot: Robot) -> str:
     more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
     return (
         f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Links "
-        f"without their meshes are drawn as other shapes or boxes. Pass the folder that contains the meshes or "
-        f"their package, as in package_dirs=[…]."
+        f"without their meshes are drawn as other shapes or boxes. Pass the folder that contains "
+        f"the meshes or their package, as in package_dirs=[…]."
     )
 
 
@@ -142,9 +156,10 @@ def _upside_down_message(robot: Robot, posture: State) -> str:
     if upright:
         return ""
     return (
-        f"{robot.name} is upside down in its posture. If the posture begins with the position and "
-        f"the quaternion of the base, the order of the quaternion must be x, y, z, w. MuJoCo's "
-        f"order is w, x, y, z: an upright base is 0, 0, 0, 1 here, and 1, 0, 0, 0 there."
+        f"{robot.name} is upside down in its posture, or its feet are not below its centre of "
+        f"mass. If the posture begins with the position and the quaternion of the base, the order "
+        f"of the quaternion must be x, y, z, w. MuJoCo's order is w, x, y, z: an upright base is "
+        f"0, 0, 0, 1 here, and 1, 0, 0, 0 there."
     )
 
 
