@@ -106,7 +106,7 @@ def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
         else "Its wheels must move to balance it, and floatbase has no task for this."
     )
     return (
-        f"{robot.name} cannot stand still, because it touches the ground only at "
+        f"{robot.name} cannot stand still on points: it touches the ground only at "
         f"{' and '.join(names)}. {advice}"
     )
 
