@@ -157,11 +157,11 @@ def test_legs_that_cannot_bend_are_reported():
 
 
 def test_a_biped_on_points_is_reported():
-    with warns(RobotWarning, "L_foot", "corners", 2):
+    with warns(RobotWarning, "L_foot", "corners", "R_foot"):
         fb.load_urdf(biped(""))
-    with warns(RobotWarning, "L_foot", "corners", 2):
+    with warns(RobotWarning, "L_foot", "corners", "R_foot"):
         fb.load_urdf(biped(BALLS), feet=["L_foot", "R_foot"], foot_radius=0.02)
-    with warns(RobotWarning, "L_foot", 2):  # a box without a size marks a place
+    with warns(RobotWarning, "L_foot", "R_foot"):  # a box without a size marks a place
         fb.load_urdf(biped('<collision><geometry><box size="0 0 0"/></geometry></collision>'))
 
 
@@ -175,7 +175,7 @@ def test_a_wheel_has_its_radius_and_its_axle_and_a_driven_ball_stays_a_ball(kind
     urdf = re.sub('(_foot_joint" type=)"revolute"', rf'\1"{kind}"', urdf).replace(
         '<axis xyz="1 0 0"/><limit lower="-1.5" upper="1.5"', '<axis xyz="0 1 0"/><limit'
     )
-    with warns(RobotWarning, 2):
+    with warns(RobotWarning, "L_foot"):
         robot = fb.load_urdf(urdf)
     for foot in robot.feet:
         assert foot.radius == pytest.approx(0.08, abs=1e-5)
