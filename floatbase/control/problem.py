@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -48,6 +48,18 @@ Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and re
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
 # m/s²: contact rows that disagree by less do so because Jacobians and drifts are rounded
 INCONSISTENCY_TOLERANCE = 1e-6
+
+
+class ModelFactors(NamedTuple):
+    """Multiples of the terms of eqs. (5) and (7) that a controller assumes.
+
+    A `modify_qp` whose class has a property `factors` of this type runs compiled.
+    """
+
+    mass: float = 1.0  # of M and h
+    gravity: float = 1.0  # of the part of h that does not depend on the velocity
+    velocity_forces: float = 1.0  # of the other part of h
+    drift: float = 1.0  # of b
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,16 +172,7 @@ class Problem(Value):
             return self.solve_levels(state, t)[-1].qp
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
-        qp = build_qp(eom, self.tasks, self.limits, t)
-        if self.modify_qp is None:
-            return qp
-        modified = as_instance("the result of modify_qp", self.modify_qp(qp, eom), QP)
-        if modified.blocks != qp.blocks:
-            raise InputError(
-                f"modify_qp changed the blocks of x from {dict(qp.blocks)} to "
-                f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
-            )
-        return modified
+        return modified_qp(self, build_qp(eom, self.tasks, self.limits, t), eom)
 
     def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
         """Solve the QPs of all priority levels at a state and a time.
@@ -293,6 +296,29 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
     return assemble_qp(eom, costs, limits, limits.hard_normal_forces(eom.contacts, t), inequalities)
+
+
+def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
+    """Apply the `modify_qp` of a problem to its QP at a state."""
+    if problem.modify_qp is None:
+        return qp
+    modified = as_instance("the result of modify_qp", problem.modify_qp(qp, eom), QP)
+    if modified.blocks != qp.blocks:
+        raise InputError(
+            f"modify_qp changed the blocks of x from {dict(qp.blocks)} to "
+            f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
+        )
+    return modified
+
+
+def model_factors(problem: Problem) -> ModelFactors | None:
+    """Return the model that a problem assumes, or None if its `modify_qp` is anything else."""
+    if problem.modify_qp is None:
+        return ModelFactors()
+    # not those of a base class, which does not know what a subclass changes
+    if "factors" not in vars(type(problem.modify_qp)):
+        return None
+    return cast("ModelFactors | None", cast(Any, problem.modify_qp).factors)
 
 
 def assemble_qp(

@@ -71,7 +71,7 @@ def largest_acceleration(gap, v, speed, acceleration, brake, most, dt):
 def joint_bounds(q, v, tree, table, dt, least, largest):
     """Write the bounds of the joint accelerations into least and largest, (d,).
 
-    tree: as in `Bodies`. table: (6, d), lower and upper position limits, speeds, accelerations,
+    tree: as in `Model`. table: (6, d), lower and upper position limits, speeds, accelerations,
     planned and largest decelerations. dt: control period, s.
     """
     d = least.size

@@ -1,25 +1,22 @@
-"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays.
+"""A problem as plain arrays for the compiled tick.
 
-Pinocchio overwrites its arrays in place. The arrays of one robot or one contact are made once, so
-that a controller with other contacts is cheap.
+The arrays of one robot or one contact are made once, so that a controller with other contacts is
+cheap.
 """
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
-from typing import Any, ClassVar, TypeAlias, cast
-from weakref import WeakSet
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._locks import InterruptibleLock
 from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
-from floatbase.control.problem import Problem
+from floatbase.control.problem import ModelFactors, Problem, model_factors
 from floatbase.control.tick.targets import TargetLayout
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
@@ -41,55 +38,30 @@ Indices: TypeAlias = npt.NDArray[np.int64]
 PolyhedronOptions: TypeAlias = tuple[int, bool, float]
 
 
-class Dynamics:
-    """Pinocchio's results for one robot."""
-
-    _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
-
-    def __init__(self, robot: Robot):
-        self.robot = robot
-        self.data = robot.model.createData()
-        self.lock = InterruptibleLock()
-        self._all.add(self)
-        model, data, n = robot.model, self.data, robot.model.njoints
-        poses = np.lib.stride_tricks.as_strided(
-            data.oMi[0].rotation.T, (n, _POSE_SIZE), (8 * _POSE_SIZE, 8)
-        )
-        self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
-        tree = [
-            (model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
-            for i in range(n)
-        ]
-        self.tree = np.array(tree, np.int64)
-        self.links = np.array([(link.mass, *link.lever) for link in model.inertias])
-
-    def update(self, q: Array, v: Array) -> None:
-        """Compute the views for a configuration q (nq,) and a velocity v (nv,)."""
-        pin.nonLinearEffects(self.robot.model, self.data, q, v)
-        pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
-
-    @property
-    def layout_supported(self) -> bool:
-        """Whether this Pinocchio version has the memory layout that the views assume."""
-        with self.lock:
-            self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
-            poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
-            return np.array_equal(poses, self.views[-1]) and np.array_equal(M, M.T)
-
-    @classmethod
-    def unlock_all(cls) -> None:
-        """Give every instance a new lock after a fork.
-
-        In a forked process no thread is left to release a lock that another thread held.
-        """
-        for dynamics in cls._all:
-            dynamics.lock = InterruptibleLock()
+@lru_cache(maxsize=16)
+def pack_robot(robot: Robot) -> tuple[Indices, tuple[Array, ...]]:
+    """Return the tables of `dynamics.Model`: the tree, then links, joints and armature."""
+    model = robot.model
+    tree, joints, links = [], [], []
+    for i, (joint, link) in enumerate(zip(model.joints, model.inertias, strict=True)):
+        is_prismatic = joint.shortname().startswith("JointModelP")
+        indices = (model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
+        tree.append((model.parents[i], *indices, is_prismatic))
+        axis = _joint_axis(joint, is_prismatic)
+        joints.append([*_flat_pose(model.jointPlacements[i]), *axis])
+        links.append([*link.inertia.ravel(), *link.lever, link.mass])
+    return np.array(tree, np.int64), (np.array(links), np.array(joints), np.array(model.armature))
 
 
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=Dynamics.unlock_all)
-
-dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one per robot, shared by its controllers
+def _joint_axis(joint: pin.JointModel, is_prismatic: bool) -> Array:
+    """Return the axis of a joint in its own frame, zero for the world and a floating base."""
+    if joint.nv != 1:
+        return np.zeros(3)
+    data = joint.createData()
+    joint.calc(data, np.eye(joint.nq)[0])
+    first = 0 if is_prismatic else 3  # linear, then angular velocity
+    axis: Array = np.ravel(data.S)[first : first + 3]
+    return axis
 
 
 def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indices, Array]:
@@ -100,11 +72,14 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses = _pack_tasks(problem, layout)
-    dynamics, limits = dynamics_of(problem.robot), problem.limits
+    (tree, robot_tables), limits = pack_robot(problem.robot), problem.limits
+    factors = model_factors(problem) or ModelFactors()
+    gravity = factors.gravity * np.array(problem.robot.model.gravity.linear)
+    terms = (*gravity, factors.mass, factors.velocity_forces, factors.drift)
     n_inequalities = len(limits.all_inequalities(problem.contacts))
     nv, user_contacts = problem.robot.nv, contacts[contacts[:, 1] == USER_DEFINED]
     sizes = {
-        N_JOINTS: len(dynamics.tree),
+        N_JOINTS: len(tree),
         N_CONTACTS: len(contacts),
         N_POINTS: len(points),
         N_MOTION_ROWS: contacts[:, 4].sum(),
@@ -120,12 +95,11 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
         HAS_JOINT_LIMITS: limits.joint_limits is not None,
     }
-    # the first entry is the counter of a workspace
     float_tables = (
-        0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits,
+        terms, *robot_tables, frames, points, gains, poses, cones, limits.torque_limits,
         *_pack_joint_limits(limits.joint_limits, problem.robot.d),
     )  # fmt: skip
-    int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
+    int_tables = np.concatenate([np.ravel(table) for table in (tree, contacts, tasks)])
     return (
         np.array([sizes[entry] for entry in range(len(sizes))], np.int64),
         int_tables,
