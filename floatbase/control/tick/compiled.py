@@ -99,11 +99,6 @@ def _unsupported_robot_reason(robot: Robot) -> str:
     """Return why a robot cannot run compiled, or ""."""
     if robot.d == 0:
         return f"{robot.name} has no driven joints"
-    if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
-        return (
-            f"{robot.name} has a single joint and no floating base, but the compiled controller "
-            f"needs at least two velocities"
-        )
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
@@ -117,8 +112,7 @@ def _unsupported_robot_reason(robot: Robot) -> str:
 class _Memory(local):
     """Workspaces of one thread, for the ticks of all its controllers."""
 
-    floats = np.empty(0)
-    ints = np.empty(0, np.int64)
+    arrays = np.empty(0), np.empty(0, np.int64)
 
 
 _memory = _Memory()
@@ -164,13 +158,11 @@ class CompiledTick:
 
     def workspace(self, n_user_rows: int = 0) -> tuple[Array, Indices]:
         """Return this thread's memory for one tick, with as many rows of user-defined tasks."""
-        n_floats, n_ints = (
-            self._workspace_sizes(self.tables[0], n_user_rows) if n_user_rows else self._sizes
-        )
-        if _memory.floats.size < n_floats or _memory.ints.size < n_ints:
-            _memory.floats = np.empty(n_floats)
-            _memory.ints = np.empty(n_ints, np.int64)
-        return _memory.floats, _memory.ints
+        sizes = self._workspace_sizes(self.tables[0], n_user_rows) if n_user_rows else self._sizes
+        floats, ints = _memory.arrays
+        if floats.size < sizes[0] or ints.size < sizes[1]:
+            floats, ints = _memory.arrays = np.empty(sizes[0]), np.empty(sizes[1], np.int64)
+        return floats, ints
 
     def run(self, q: Array, v: Array, inputs: TickInputs, n_stages: int) -> tuple[Array, int]:
         """Run the first stages of one tick; return its numbers, and the number of active rows."""

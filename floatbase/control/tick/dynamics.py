@@ -30,6 +30,7 @@ FLOATING = 6  # entries of v of the floating base
 # entries of `Model.terms` after gravity: multiples of M and h, of the part of h that depends on the
 # velocity, and of b in eq. (5). The controller assumes them, but tasks use the exact model
 MASS_FACTOR, VELOCITY_FACTOR, DRIFT_FACTOR, N_TERMS = 3, 4, 5, 6
+LINK_SIZE = 13  # numbers of a link: inertia column by column, centre of mass, mass
 
 
 class Model(NamedTuple):
@@ -71,14 +72,14 @@ def take_bodies(model: Model, v, workspace):
     return Bodies(
         model.tree, v, take_matrix(workspace, n, 12), take_matrix(workspace, nv, 6),
         take_matrix(workspace, n, 6), take_matrix(workspace, n, 6),
-        take_matrix(workspace, n, 13), take_matrix(workspace, n, 6),
+        take_matrix(workspace, n, LINK_SIZE), take_matrix(workspace, n, 6),
         take_matrix(workspace, nv, 6), take_matrix(workspace, nv, nv), take_vector(workspace, nv),
     )  # fmt: skip
 
 
 def bodies_size(n, nv):
     """Return how many numbers `take_bodies` takes for n joints and nv velocities."""
-    return (12 + 6 + 6 + 13 + 6) * n + (6 + 6 + nv + 1) * nv
+    return (12 + 6 + 6 + LINK_SIZE + 6) * n + (6 + 6 + nv + 1) * nv
 
 
 @jit
@@ -198,7 +199,7 @@ def link_momentum(model: Model, bodies: Bodies):
     """Fill composite and rate with the numbers of each link alone."""
     links, composite = model.links, bodies.composite
     for i in range(1, links.shape[0]):
-        mass, R = links[i, 12], rotation_in(bodies.poses, i)
+        mass, R = links[i, LINK_SIZE - 1], rotation_in(bodies.poses, i)
         p = plus(row_part(bodies.poses, i, 9), rotate(R, row_part(links, i, 9)))
         x, y, z = rotation_in(links, i)
         half, rows = (rotate(R, x), rotate(R, y), rotate(R, z)), transpose(R)
@@ -215,7 +216,7 @@ def link_momentum(model: Model, bodies: Bodies):
             shift = times(mass, minus(units[k], times(p[k], p)))
             write_row(composite, i, 3 * k, plus(inertia[k], shift))
         write_row(composite, i, 9, times(mass, p))
-        composite[i, 12] = mass
+        composite[i, LINK_SIZE - 1] = mass
 
 
 @jit
@@ -224,12 +225,12 @@ def composite_bodies(model: Model, bodies: Bodies):
     tree, terms, J, Ag, M = model.tree, model.terms, bodies.J, bodies.Ag, bodies.M
     composite, rate, gravity = bodies.composite, bodies.rate, (terms[0], terms[1], terms[2])
     clear(M)
-    for r in range(13):
+    for r in range(LINK_SIZE):
         composite[0, r] = 0.0
     for r in range(6):
         rate[0, r] = 0.0
     for i in range(tree.shape[0] - 1, 0, -1):
-        inertia, mass = rotation_in(composite, i), composite[i, 12]
+        inertia, mass = rotation_in(composite, i), composite[i, LINK_SIZE - 1]
         moment = row_part(composite, i, 9)
         for c in range(tree[i, 1], tree[i, 1] + tree[i, 2]):
             linear, angular = row_part(J, c, 0), row_part(J, c, 3)
@@ -247,11 +248,11 @@ def composite_bodies(model: Model, bodies: Bodies):
                 j = tree[j, 0]
             M[c, c] += terms[MASS_FACTOR] * model.armature[c]
         parent = tree[i, 0]
-        for r in range(13):
+        for r in range(LINK_SIZE):
             composite[parent, r] += composite[i, r]
         for r in range(6):
             rate[parent, r] += rate[i, r]
-    com = times(1.0 / composite[0, 12], row_part(composite, 0, 9))
+    com = times(1.0 / composite[0, LINK_SIZE - 1], row_part(composite, 0, 9))
     for c in range(Ag.shape[0]):
         write_row(Ag, c, 3, minus(row_part(Ag, c, 3), cross(com, row_part(Ag, c, 0))))
 
@@ -259,7 +260,7 @@ def composite_bodies(model: Model, bodies: Bodies):
 @jit
 def centre_of_mass(bodies: Bodies):
     """Return position, velocity and drift of the centre of mass, and the mass."""
-    mass, momentum = bodies.composite[0, 12], (0.0, 0.0, 0.0)
+    mass, momentum = bodies.composite[0, LINK_SIZE - 1], (0.0, 0.0, 0.0)
     for c in range(bodies.v.size):
         momentum = plus(momentum, times(bodies.v[c], row_part(bodies.Ag, c, 0)))
     scale = 1.0 / mass

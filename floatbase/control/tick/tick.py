@@ -17,6 +17,7 @@ from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.dynamics import (
     DRIFT_FACTOR,
+    LINK_SIZE,
     N_TERMS,
     Model,
     bodies_size,
@@ -86,7 +87,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     task_table = read_matrix(int_tables, ints, n_tasks, 3)
     terms, links = (
         read_vector(float_tables, floats, N_TERMS),
-        read_matrix(float_tables, floats, n, 13),
+        read_matrix(float_tables, floats, n, LINK_SIZE),
     )
     joints = read_matrix(float_tables, floats, n, 15)
     model = Model(tree, joints, links, read_vector(float_tables, floats, nv), terms)
@@ -181,8 +182,9 @@ def make_tick(digest):
         (nv,), the state. inputs: what changes from tick to tick, as `user_terms.UserTerms` packs
         it: targets, minimum and maximum normal force of each point, then user-defined contacts,
         tasks and rows. sizes, int_tables, float_tables: as for `unpack`; few arrays, since each one
-        costs time. float_workspace, int_workspace: workspaces of `workspace_sizes` numbers. result:
-        receives q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each, then
+        costs time. float_workspace, int_workspace: workspaces of `workspace_sizes` numbers, the
+        only memory besides `result` that is written to. result: receives q̈, τ, λ, then the
+        multipliers and the numbers of the active rows, (nv + k,) each, then
         `Inequalities.saturated`. stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
