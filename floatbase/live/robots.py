@@ -19,7 +19,7 @@ from floatbase._validation import Array
 from floatbase.behaviours import WEIGHT_SHIFT_TIME, Gait, Walk
 from floatbase.control import JointLimits, WholeBodyController
 from floatbase.control.tick import CompiledTick, tick
-from floatbase.control.tick.dynamics import LINK_SIZE, N_TERMS, VELOCITY_FACTOR
+from floatbase.control.tick.dynamics import MASS, N_TERMS, VELOCITY_FACTOR
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.live.settings import SETTINGS
@@ -167,7 +167,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
             # the tables begin with `Model.terms` and the links, of which the first is the world
             "gravity": 2,
             "velocityForces": VELOCITY_FACTOR,
-            "baseMass": N_TERMS + 2 * LINK_SIZE - 1,
+            "baseMass": N_TERMS + (MASS + 1) + MASS,
         },
     }
 

@@ -30,7 +30,8 @@ FLOATING = 6  # entries of v of the floating base
 # entries of `Model.terms` after gravity: multiples of M and h, of the part of h that depends on the
 # velocity, and of b in eq. (5). The controller assumes them, but tasks use the exact model
 MASS_FACTOR, VELOCITY_FACTOR, DRIFT_FACTOR, N_TERMS = 3, 4, 5, 6
-LINK_SIZE = 13  # numbers of a link: inertia column by column, centre of mass, mass
+# columns of `Model.links` and `Bodies.carried`, after the inertia column by column
+COM, MASS, RATE = 9, 12, 13
 
 
 class Model(NamedTuple):
@@ -55,11 +56,10 @@ class Bodies(NamedTuple):
     J: Any
     velocity: Any  # (n, 6), of each joint
     drift: Any  # (n, 6), its derivative at q̈ = 0
-    # (n, 13), of each joint with all links that it carries: inertia about the world's origin column
-    # by column, mass × position of the CoM, mass
-    composite: Any
-    # (n, 6), rate of the momentum about the world's origin at q̈ = 0, of the same links
-    rate: Any
+    # (n, 19), of each joint with all links that it carries: inertia about the world's origin column
+    # by column, mass × position of the CoM, mass, then the rate of the momentum about the world's
+    # origin at q̈ = 0, linear and angular
+    carried: Any
     Ag: Any  # (nv, 6), centroidal momentum for each entry of v: linear, then angular
     M: Any  # (nv, nv), of eq. (1), as the controller assumes it
     h: Any  # (nv,), likewise
@@ -72,14 +72,14 @@ def take_bodies(model: Model, v, workspace):
     return Bodies(
         model.tree, v, take_matrix(workspace, n, 12), take_matrix(workspace, nv, 6),
         take_matrix(workspace, n, 6), take_matrix(workspace, n, 6),
-        take_matrix(workspace, n, LINK_SIZE), take_matrix(workspace, n, 6),
-        take_matrix(workspace, nv, 6), take_matrix(workspace, nv, nv), take_vector(workspace, nv),
+        take_matrix(workspace, n, RATE + 6), take_matrix(workspace, nv, 6),
+        take_matrix(workspace, nv, nv), take_vector(workspace, nv),
     )  # fmt: skip
 
 
 def bodies_size(n, nv):
     """Return how many numbers `take_bodies` takes for n joints and nv velocities."""
-    return (12 + 6 + 6 + LINK_SIZE + 6) * n + (6 + 6 + nv + 1) * nv
+    return (12 + 6 + 6 + RATE + 6) * n + (6 + 6 + nv + 1) * nv
 
 
 @jit
@@ -95,69 +95,49 @@ def compute_dynamics(model: Model, bodies: Bodies, q):
 def forward_positions(model: Model, bodies: Bodies, q):
     """Fill poses and J from the root to the leaves."""
     tree, joints, poses, J = model.tree, model.joints, bodies.poses, bodies.J
-    write_row(poses, 0, 0, (1.0, 0.0, 0.0))
-    write_row(poses, 0, 3, (0.0, 1.0, 0.0))
-    write_row(poses, 0, 6, (0.0, 0.0, 1.0))
-    write_row(poses, 0, 9, (0.0, 0.0, 0.0))
+    for k in range(12):
+        poses[0, k] = 1.0 if k in (0, 4, 8) else 0.0
     for i in range(1, tree.shape[0]):
         parent, c, at = tree[i, 0], tree[i, 1], tree[i, 3]
-        R, placement = rotation_in(poses, parent), rotation_in(joints, i)
+        R, (x, y, z) = rotation_in(poses, parent), rotation_in(joints, i)
         p = plus(row_part(poses, parent, 9), rotate(R, row_part(joints, i, 9)))
-        R = (rotate(R, placement[0]), rotate(R, placement[1]), rotate(R, placement[2]))
-        axis = row_part(joints, i, 12)
-        world_axis = rotate(R, axis)
+        R = (rotate(R, x), rotate(R, y), rotate(R, z))
+        axis, sine, versine = rotate(R, row_part(joints, i, 12)), 0.0, 0.0
         if tree[i, 2] == FLOATING:
             p = plus(p, rotate(R, (q[at], q[at + 1], q[at + 2])))
-            x, y, z = quaternion_columns(q[at + 3], q[at + 4], q[at + 5], q[at + 6])
-            R = (rotate(R, x), rotate(R, y), rotate(R, z))
-            write_base_columns(J, c, R, p)
+            # a unit quaternion: the same formula with the vector part as the axis
+            axis = rotate(R, (q[at + 3], q[at + 4], q[at + 5]))
+            sine, versine = 2.0 * q[at + 6], 2.0
         elif tree[i, 5] == 1:
-            p = plus(p, times(q[at], world_axis))
-            write_row(J, c, 0, world_axis)
+            p = plus(p, times(q[at], axis))
+            write_row(J, c, 0, axis)
             write_row(J, c, 3, (0.0, 0.0, 0.0))
         else:
-            cosine, sine = np.cos(q[at]), np.sin(q[at])
+            sine, versine = np.sin(q[at]), 1.0 - np.cos(q[at])
             if tree[i, 4] == 2:  # joints without limits are (cos, sin) in q
-                cosine, sine = q[at], q[at + 1]
-            R = (
-                turned(R[0], world_axis, axis[0], cosine, sine),
-                turned(R[1], world_axis, axis[1], cosine, sine),
-                turned(R[2], world_axis, axis[2], cosine, sine),
-            )
-            write_row(J, c, 0, cross(p, world_axis))
-            write_row(J, c, 3, world_axis)
-        write_row(poses, i, 0, R[0])
-        write_row(poses, i, 3, R[1])
-        write_row(poses, i, 6, R[2])
+                sine, versine = q[at + 1], 1.0 - q[at]
+            write_row(J, c, 0, cross(p, axis))
+            write_row(J, c, 3, axis)
+        R = (
+            turned(R[0], axis, sine, versine),
+            turned(R[1], axis, sine, versine),
+            turned(R[2], axis, sine, versine),
+        )
+        for k in range(3):
+            write_row(poses, i, 3 * k, R[k])
+            if tree[i, 2] == FLOATING:  # its velocity is in its own axes
+                write_row(J, c + k, 0, R[k])
+                write_row(J, c + k, 3, (0.0, 0.0, 0.0))
+                write_row(J, c + 3 + k, 0, cross(p, R[k]))
+                write_row(J, c + 3 + k, 3, R[k])
         write_row(poses, i, 9, p)
 
 
 @jit
-def quaternion_columns(x, y, z, w):
-    """Return the columns of the rotation of a unit quaternion."""
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)),
-        (2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)),
-        (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)),
-    )
-
-
-@jit
-def turned(a, axis, along, cosine, sine):
-    """Return the vector a turned about a unit axis; along: a · axis."""
-    return plus(
-        times(cosine, a), plus(times(sine, cross(axis, a)), times((1.0 - cosine) * along, axis))
-    )
-
-
-@jit
-def write_base_columns(J, c, R, p):
-    """Write the columns of the floating base, whose velocity is in its own axes R, at p."""
-    for k in range(3):
-        write_row(J, c + k, 0, R[k])
-        write_row(J, c + k, 3, (0.0, 0.0, 0.0))
-        write_row(J, c + 3 + k, 0, cross(p, R[k]))
-        write_row(J, c + 3 + k, 3, R[k])
+def turned(a, axis, sine, versine):
+    """Return the vector a turned about a unit axis; versine: 1 - cosine of the angle."""
+    moved = cross(axis, a)
+    return plus(a, plus(times(sine, moved), times(versine, cross(axis, moved))))
 
 
 @jit
@@ -196,11 +176,11 @@ def point_velocity(bodies: Bodies, joint, p):
 
 @jit
 def link_momentum(model: Model, bodies: Bodies):
-    """Fill composite and rate with the numbers of each link alone."""
-    links, composite = model.links, bodies.composite
+    """Fill `carried` with the numbers of each link alone."""
+    links, carried = model.links, bodies.carried
     for i in range(1, links.shape[0]):
-        mass, R = links[i, LINK_SIZE - 1], rotation_in(bodies.poses, i)
-        p = plus(row_part(bodies.poses, i, 9), rotate(R, row_part(links, i, 9)))
+        mass, R = links[i, MASS], rotation_in(bodies.poses, i)
+        p = plus(row_part(bodies.poses, i, 9), rotate(R, row_part(links, i, COM)))
         x, y, z = rotation_in(links, i)
         half, rows = (rotate(R, x), rotate(R, y), rotate(R, z)), transpose(R)
         inertia = (rotate(half, rows[0]), rotate(half, rows[1]), rotate(half, rows[2]))
@@ -208,37 +188,36 @@ def link_momentum(model: Model, bodies: Bodies):
         angular, alpha = row_part(bodies.velocity, i, 3), row_part(bodies.drift, i, 3)
         force = times(mass, acceleration)
         moment = plus(rotate(inertia, alpha), cross(angular, rotate(inertia, angular)))
-        write_row(bodies.rate, i, 0, force)
-        write_row(bodies.rate, i, 3, plus(moment, cross(p, force)))
         square = dot(p, p)
         units = ((square, 0.0, 0.0), (0.0, square, 0.0), (0.0, 0.0, square))
         for k in range(3):  # Steiner's theorem
             shift = times(mass, minus(units[k], times(p[k], p)))
-            write_row(composite, i, 3 * k, plus(inertia[k], shift))
-        write_row(composite, i, 9, times(mass, p))
-        composite[i, LINK_SIZE - 1] = mass
+            write_row(carried, i, 3 * k, plus(inertia[k], shift))
+        write_row(carried, i, COM, times(mass, p))
+        carried[i, MASS] = mass
+        write_row(carried, i, RATE, force)
+        write_row(carried, i, RATE + 3, plus(moment, cross(p, force)))
 
 
 @jit
 def composite_bodies(model: Model, bodies: Bodies):
-    """Add up composite and rate from the leaves to the root; fill Ag, M and h."""
+    """Add up `carried` from the leaves to the root; fill Ag, M and h."""
     tree, terms, J, Ag, M = model.tree, model.terms, bodies.J, bodies.Ag, bodies.M
-    composite, rate, gravity = bodies.composite, bodies.rate, (terms[0], terms[1], terms[2])
+    carried, gravity = bodies.carried, (terms[0], terms[1], terms[2])
     clear(M)
-    for r in range(LINK_SIZE):
-        composite[0, r] = 0.0
-    for r in range(6):
-        rate[0, r] = 0.0
+    for r in range(carried.shape[1]):
+        carried[0, r] = 0.0
     for i in range(tree.shape[0] - 1, 0, -1):
-        inertia, mass = rotation_in(composite, i), composite[i, LINK_SIZE - 1]
-        moment = row_part(composite, i, 9)
+        inertia, mass = rotation_in(carried, i), carried[i, MASS]
+        moment, force = row_part(carried, i, COM), row_part(carried, i, RATE)
+        torque = row_part(carried, i, RATE + 3)
         for c in range(tree[i, 1], tree[i, 1] + tree[i, 2]):
             linear, angular = row_part(J, c, 0), row_part(J, c, 3)
             f = plus(times(mass, linear), cross(angular, moment))
             m = plus(rotate(inertia, angular), cross(moment, linear))
             write_row(Ag, c, 0, f)
             write_row(Ag, c, 3, m)
-            h = dot(linear, row_part(rate, i, 0)) + dot(angular, row_part(rate, i, 3))
+            h = dot(linear, force) + dot(angular, torque)
             bodies.h[c] = terms[MASS_FACTOR] * (terms[VELOCITY_FACTOR] * h - dot(f, gravity))
             j = i
             while j > 0:
@@ -247,12 +226,9 @@ def composite_bodies(model: Model, bodies: Bodies):
                     M[c, e] = M[e, c] = terms[MASS_FACTOR] * x
                 j = tree[j, 0]
             M[c, c] += terms[MASS_FACTOR] * model.armature[c]
-        parent = tree[i, 0]
-        for r in range(LINK_SIZE):
-            composite[parent, r] += composite[i, r]
-        for r in range(6):
-            rate[parent, r] += rate[i, r]
-    com = times(1.0 / composite[0, LINK_SIZE - 1], row_part(composite, 0, 9))
+        for r in range(carried.shape[1]):
+            carried[tree[i, 0], r] += carried[i, r]
+    com = times(1.0 / carried[0, MASS], row_part(carried, 0, COM))
     for c in range(Ag.shape[0]):
         write_row(Ag, c, 3, minus(row_part(Ag, c, 3), cross(com, row_part(Ag, c, 0))))
 
@@ -260,9 +236,8 @@ def composite_bodies(model: Model, bodies: Bodies):
 @jit
 def centre_of_mass(bodies: Bodies):
     """Return position, velocity and drift of the centre of mass, and the mass."""
-    mass, momentum = bodies.composite[0, LINK_SIZE - 1], (0.0, 0.0, 0.0)
+    mass, momentum = bodies.carried[0, MASS], (0.0, 0.0, 0.0)
     for c in range(bodies.v.size):
         momentum = plus(momentum, times(bodies.v[c], row_part(bodies.Ag, c, 0)))
-    scale = 1.0 / mass
-    com, drift = row_part(bodies.composite, 0, 9), row_part(bodies.rate, 0, 0)
-    return times(scale, com), times(scale, momentum), times(scale, drift), mass
+    com, rate = row_part(bodies.carried, 0, COM), row_part(bodies.carried, 0, RATE)
+    return times(1.0 / mass, com), times(1.0 / mass, momentum), times(1.0 / mass, rate), mass

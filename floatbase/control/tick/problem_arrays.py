@@ -44,24 +44,15 @@ def pack_robot(robot: Robot) -> tuple[Indices, tuple[Array, ...]]:
     model = robot.model
     tree, joints, links = [], [], []
     for i, (joint, link) in enumerate(zip(model.joints, model.inertias, strict=True)):
-        is_prismatic = joint.shortname().startswith("JointModelP")
         indices = (model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
-        tree.append((model.parents[i], *indices, is_prismatic))
-        axis = _joint_axis(joint, is_prismatic)
+        tree.append((model.parents[i], *indices, joint.shortname().startswith("JointModelP")))
+        data, axis = joint.createData(), np.zeros(3)
+        if joint.nv == 1:
+            joint.calc(data, np.eye(joint.nq)[0])
+            axis = np.ravel(data.S).reshape(2, 3).sum(axis=0)  # linear or angular
         joints.append([*_flat_pose(model.jointPlacements[i]), *axis])
         links.append([*link.inertia.ravel(), *link.lever, link.mass])
     return np.array(tree, np.int64), (np.array(links), np.array(joints), np.array(model.armature))
-
-
-def _joint_axis(joint: pin.JointModel, is_prismatic: bool) -> Array:
-    """Return the axis of a joint in its own frame, zero for the world and a floating base."""
-    if joint.nv != 1:
-        return np.zeros(3)
-    data = joint.createData()
-    joint.calc(data, np.eye(joint.nq)[0])
-    first = 0 if is_prismatic else 3  # linear, then angular velocity
-    axis: Array = np.ravel(data.S)[first : first + 3]
-    return axis
 
 
 def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indices, Array]:

@@ -17,7 +17,7 @@ from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.dynamics import (
     DRIFT_FACTOR,
-    LINK_SIZE,
+    MASS,
     N_TERMS,
     Model,
     bodies_size,
@@ -87,7 +87,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     task_table = read_matrix(int_tables, ints, n_tasks, 3)
     terms, links = (
         read_vector(float_tables, floats, N_TERMS),
-        read_matrix(float_tables, floats, n, LINK_SIZE),
+        read_matrix(float_tables, floats, n, MASS + 1),
     )
     joints = read_matrix(float_tables, floats, n, 15)
     model = Model(tree, joints, links, read_vector(float_tables, floats, nv), terms)
