@@ -163,4 +163,4 @@ def compile_lock(function: Any, *, ahead: bool = False) -> Iterator[None]:
 
 def without_cache(function: Any) -> Any:
     """Compile in memory a function whose compiled code could not be loaded or kept."""
-    return function if function.signatures else jit(function.py_func, **function.targetoptions)
+    return function if function.signatures else jit(function.py_func, nogil=True)
