@@ -50,16 +50,19 @@ _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
 INCONSISTENCY_TOLERANCE = 1e-6
 
 
-class ModelFactors(NamedTuple):
-    """Multiples of the terms of eqs. (5) and (7) that a controller assumes.
+class AssumedModel(NamedTuple):
+    """What a controller assumes instead of eqs. (5), (7) and (28), by default nothing else.
 
-    A `modify_qp` whose class has a property `factors` of this type runs compiled.
+    A `modify_qp` whose class has a property `assumed_model` of this type runs compiled.
     """
 
-    mass: float = 1.0  # of M and h
-    gravity: float = 1.0  # of the part of h that does not depend on the velocity
-    velocity_forces: float = 1.0  # of the other part of h
-    drift: float = 1.0  # of b
+    mass: float = 1.0  # multiple of M and h
+    gravity: float = 1.0  # multiple of the part of h that does not depend on the velocity
+    velocity_forces: float = 1.0  # multiple of the other part of h
+    drift: float = 1.0  # multiple of b
+    ignored_contacts: Sequence[str] = ()  # contacts whose forces are missing from (7)
+    underactuated: bool = True  # whether the base's rows of (7) hold
+    cones: bool = True  # whether friction and minimum normal forces are constraints
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,14 +314,14 @@ def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
     return modified
 
 
-def model_factors(problem: Problem) -> ModelFactors | None:
+def assumed_model(problem: Problem) -> AssumedModel | None:
     """Return the model that a problem assumes, or None if its `modify_qp` is anything else."""
     if problem.modify_qp is None:
-        return ModelFactors()
-    # not those of a base class, which does not know what a subclass changes
-    if "factors" not in vars(type(problem.modify_qp)):
+        return AssumedModel()
+    # not that of a base class, which does not know what a subclass changes
+    if "assumed_model" not in vars(type(problem.modify_qp)):
         return None
-    return cast("ModelFactors | None", cast(Any, problem.modify_qp).factors)
+    return cast(AssumedModel, cast(Any, problem.modify_qp).assumed_model)
 
 
 def assemble_qp(

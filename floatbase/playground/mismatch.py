@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings, checked
-from floatbase.control.problem import ModelFactors
+from floatbase.control.problem import AssumedModel
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import unknown_name
 from floatbase.qp import QP, ConstraintLabel
@@ -66,10 +66,10 @@ class ModelMismatch(Value):
         return self == ModelMismatch()
 
     @property
-    def factors(self) -> ModelFactors | None:
-        """Multiples of the terms of eqs. (5) and (7), or None if the mismatch changes more."""
-        terms = (self.mass, self.gravity, self.velocity_forces, self.drift)
-        return ModelFactors(*map(float, terms)) if self == ModelMismatch(*terms) else None
+    def assumed_model(self) -> AssumedModel:
+        """The mismatch in the form that runs compiled."""
+        numbers = self.mass, self.gravity, self.velocity_forces, self.drift
+        return AssumedModel(*numbers, tuple(self.ignored_contacts), self.underactuated, self.cones)
 
     def assumed_equations(self, eom: EquationsOfMotion) -> EquationsOfMotion:
         """Return the equations of motion that the controller assumes.

@@ -16,7 +16,7 @@ import numpy as np
 from floatbase._validation import Array
 from floatbase.control.limits import force_rows, hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, modified_qp, residual_of
-from floatbase.control.tick.problem_arrays import Indices, pack_problem
+from floatbase.control.tick.problem_arrays import HAS_CONES, Indices, pack_problem
 from floatbase.control.tick.targets import TargetLayout, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
@@ -275,7 +275,7 @@ class CompiledTick:
             if limits.joint_limits is None
             else limits.joint_limits.bounded.ravel()
         )
-        friction = np.full(contacts.n_points * (limits.facets + 1), True)
+        friction = np.full(contacts.n_points * (limits.facets + 1), self.tables[0][HAS_CONES] == 1)
         group_sizes = [len(h) for _, h in inputs.inequalities]
         has_row = np.concatenate(
             [

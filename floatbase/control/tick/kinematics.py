@@ -25,14 +25,15 @@ from floatbase.control.tick.workspace import clear
 class ContactTable(NamedTuple):
     """C contacts with P points."""
 
-    # (C, 6), joint, kind, first point, number of points, of motion rows, of entries of λ
+    # (C, 7), joint, kind, first point, number of points, of motion rows, of entries of λ, and 1 if
+    # the controller assumes that its forces have no effect
     table: Any
     frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
     points: Any  # (P, 3), centre of the ball, or corners, in the frame
     inputs: Any  # packed by `user_terms.UserTerms`
     # where the user-defined contacts' A, b and J start in it, one contact after another
     user_start: Any
-    points_only: Any  # whether all are point contacts, whose A and J are the same
+    points_only: Any  # whether all are point contacts with an effect: their A and J are the same
 
 
 @jit
@@ -113,3 +114,8 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
         b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
         row, force = row + m, force + k
+    force = 0
+    for i in range(contacts.table.shape[0]):
+        if contacts.table[i, 6] == 1:
+            clear(J[force : force + contacts.table[i, 5]])
+        force += contacts.table[i, 5]

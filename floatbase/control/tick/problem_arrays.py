@@ -16,7 +16,7 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
-from floatbase.control.problem import ModelFactors, Problem, model_factors
+from floatbase.control.problem import AssumedModel, Problem, assumed_model
 from floatbase.control.tick.targets import TargetLayout
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
@@ -31,8 +31,9 @@ _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 # numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
 N_JOINTS, N_CONTACTS, N_POINTS, N_MOTION_ROWS, N_CONE_ROWS, N_TASKS, N_DRIVEN = range(7)
 N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 12)
-# then 1 or 0: all contacts are points, `Inequalities.has_optional`, there are joint limits
+# then 1 or 0: A and J are equal, `Inequalities.has_optional`, there are joint limits
 POINTS_ONLY, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
+UNDERACTUATED, HAS_CONES = range(15, 17)  # likewise, as in `AssumedModel`
 Indices: TypeAlias = npt.NDArray[np.int64]
 # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
 PolyhedronOptions: TypeAlias = tuple[int, bool, float]
@@ -64,9 +65,10 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses = _pack_tasks(problem, layout)
     (tree, robot_tables), limits = pack_robot(problem.robot), problem.limits
-    factors = model_factors(problem) or ModelFactors()
-    gravity = factors.gravity * np.array(problem.robot.model.gravity.linear)
-    terms = (*gravity, factors.mass, factors.velocity_forces, factors.drift)
+    assumed = assumed_model(problem) or AssumedModel()
+    gravity = assumed.gravity * np.array(problem.robot.model.gravity.linear)
+    terms = (*gravity, assumed.mass, assumed.velocity_forces, assumed.drift)
+    contacts[:, 6] = [name in assumed.ignored_contacts for name in problem.contacts.names]
     n_inequalities = len(limits.all_inequalities(problem.contacts))
     nv, user_contacts = problem.robot.nv, contacts[contacts[:, 1] == USER_DEFINED]
     sizes = {
@@ -79,12 +81,14 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         N_DRIVEN: problem.robot.d,
         N_FORCES: problem.contacts.k,
         N_TARGETS: layout.size,
-        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:]),
+        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:6]),
         N_USER_TASKS: len(problem.tasks) - len(tasks),
         N_INEQUALITIES: n_inequalities,
-        POINTS_ONLY: np.all(contacts[:, 1] == POINT),
+        POINTS_ONLY: np.all(contacts[:, 1] == POINT) and not np.any(contacts[:, 6]),
         HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
         HAS_JOINT_LIMITS: limits.joint_limits is not None,
+        UNDERACTUATED: assumed.underactuated,
+        HAS_CONES: assumed.cones,
     }
     float_tables = (
         terms, *robot_tables, frames, points, gains, poses, cones, limits.torque_limits,
@@ -108,7 +112,7 @@ def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array
 
 
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
-    """Return contacts (C, 6), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
+    """Return contacts (C, 7), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
 
     The first three arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
@@ -118,7 +122,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
         for contact in problem.contacts
     ]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
-    tables = np.array(table, np.int64).reshape(-1, 6)
+    tables = np.array(table, np.int64).reshape(-1, 7)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
         np.concatenate([np.zeros((0, width)), *parts])
@@ -136,7 +140,7 @@ def _pack_contact(
     cones: Array = np.zeros((0, 5))
     if isinstance(contact, FrictionContact):
         n, cones = len(contact.point_names), _cones(contact, options)
-    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k)
+    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k, 0)
     return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), cones
 
 
@@ -152,7 +156,8 @@ def _pack_builtin_contact(
         else (0.0, contact.corners)
     )
     points = np.array(points).reshape(-1, 3)
-    row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
+    kind, n_rows = CONTACT_KINDS[type(contact)], len(contact.row_names)
+    row = (joint, kind, 0, len(points), n_rows, contact.k, 0)
     return (
         row,
         np.concatenate([pose, contact.normal, [radius]])[None],

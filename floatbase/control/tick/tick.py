@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from floatbase.control.tick import problem_arrays as size
 from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.dynamics import (
@@ -36,23 +37,6 @@ from floatbase.control.tick.elimination import (
 from floatbase.control.tick.inequalities import Inequalities, affine_value, joint_bounds
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import ContactTable, contact_rows
-from floatbase.control.tick.problem_arrays import (
-    HAS_JOINT_LIMITS,
-    HAS_OPTIONAL,
-    N_CONE_ROWS,
-    N_CONTACT_NUMBERS,
-    N_CONTACTS,
-    N_DRIVEN,
-    N_FORCES,
-    N_INEQUALITIES,
-    N_JOINTS,
-    N_MOTION_ROWS,
-    N_POINTS,
-    N_TARGETS,
-    N_TASKS,
-    N_USER_TASKS,
-    POINTS_ONLY,
-)
 from floatbase.control.tick.workspace import (
     all_finite,
     read_matrix,
@@ -77,28 +61,27 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     memory for `Inequalities`. int_tables, float_tables: integers and real numbers of all tables,
     one table after another. inputs: as for `tick`.
     """
-    n, d, k = sizes[N_JOINTS], sizes[N_DRIVEN], sizes[N_FORCES]
-    n_contacts, n_points, n_rows = sizes[N_CONTACTS], sizes[N_POINTS], sizes[N_CONE_ROWS]
-    n_tasks, n_user_tasks = sizes[N_TASKS], sizes[N_USER_TASKS]
+    n, d, k = sizes[size.N_JOINTS], sizes[size.N_DRIVEN], sizes[size.N_FORCES]
+    n_contacts, n_points = sizes[size.N_CONTACTS], sizes[size.N_POINTS]
+    n_rows, n_tasks = sizes[size.N_CONE_ROWS], sizes[size.N_TASKS]
+    n_user_tasks = sizes[size.N_USER_TASKS]
     ints, floats = counters[:1], counters[1:]
     ints[0], floats[0] = 0, 0
     tree = read_matrix(int_tables, ints, n, 6)
-    contact_table = read_matrix(int_tables, ints, n_contacts, 6)
+    contact_table = read_matrix(int_tables, ints, n_contacts, 7)
     task_table = read_matrix(int_tables, ints, n_tasks, 3)
-    terms, links = (
-        read_vector(float_tables, floats, N_TERMS),
-        read_matrix(float_tables, floats, n, MASS + 1),
-    )
+    terms = read_vector(float_tables, floats, N_TERMS)
+    links = read_matrix(float_tables, floats, n, MASS + 1)
     joints = read_matrix(float_tables, floats, n, 15)
     model = Model(tree, joints, links, read_vector(float_tables, floats, nv), terms)
     frames = read_matrix(float_tables, floats, n_contacts, 16)
     points = read_matrix(float_tables, floats, n_points, 3)
-    bounds = sizes[N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
+    bounds = sizes[size.N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
     user_start = bounds + 2 * n_points
-    points_only = sizes[POINTS_ONLY] == 1
+    points_only = sizes[size.POINTS_ONLY] == 1
     contacts = ContactTable(contact_table, frames, points, inputs, user_start, points_only)
     gains = read_matrix(float_tables, floats, n_tasks, 3)
-    user_tasks = user_start + sizes[N_CONTACT_NUMBERS]
+    user_tasks = user_start + sizes[size.N_CONTACT_NUMBERS]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, n_user_tasks, nv, k, d)
     task_frames = read_matrix(float_tables, floats, n_tasks, 12)
     tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, n_user_tasks, n_user_rows)
@@ -108,8 +91,8 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     period, joint_limit_weight = read_vector(float_tables, floats, 2)
     limits = Inequalities(
         cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities,
-        sizes[N_INEQUALITIES], sizes[HAS_OPTIONAL] == 1, sizes[HAS_JOINT_LIMITS] == 1, least,
-        largest, joint_limit_weight, saturated,
+        sizes[size.N_INEQUALITIES], sizes[size.HAS_CONES] == 1, sizes[size.HAS_OPTIONAL] == 1,
+        sizes[size.HAS_JOINT_LIMITS] == 1, least, largest, joint_limit_weight, saturated,
     )  # fmt: skip
     return model, contacts, tasks, limits, joint_limits, period
 
@@ -120,7 +103,8 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """
     n_joints, n_tasks, m, d, k = (
-        int(sizes[entry]) for entry in (N_JOINTS, N_TASKS, N_MOTION_ROWS, N_DRIVEN, N_FORCES)
+        int(sizes[entry])
+        for entry in (size.N_JOINTS, size.N_TASKS, size.N_MOTION_ROWS, size.N_DRIVEN, size.N_FORCES)
     )
     base = 6
     nv = d + base
@@ -188,8 +172,10 @@ def make_tick(digest):
         `Inequalities.saturated`. stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
-        nv, m, d, k = v.size, sizes[N_MOTION_ROWS], sizes[N_DRIVEN], sizes[N_FORCES]
+        nv, m = v.size, sizes[size.N_MOTION_ROWS]
+        d, k = sizes[size.N_DRIVEN], sizes[size.N_FORCES]
         base, n = nv - d, nv + k
+        passive = base if sizes[size.UNDERACTUATED] == 1 else 0  # rows of (7) without a motor
         float_workspace[0], int_workspace[0] = 1, 1
         least, largest = take_vector(float_workspace, d), take_vector(float_workspace, d)
         model, contacts, tasks, limits, joint_limits, period = unpack(
@@ -210,23 +196,23 @@ def make_tick(digest):
             b[i] *= model.terms[DRIFT_FACTOR]
         if stages == 2:
             return STOPPED
-        B = take_matrix(float_workspace, m + base, n + 1)
-        pivots = take_vector(int_workspace, m + base)
+        B = take_matrix(float_workspace, m + passive, n + 1)
+        pivots = take_vector(int_workspace, m + passive)
         motion_pivot, smallest_pivot = eliminate(
-            A, b, M, h, J_points, base, float_workspace, B, pivots
+            A, b, M, h, J_points, passive, float_workspace, B, pivots
         )
         if motion_pivot <= DEPENDENT_ROW:
             rows, rhs = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
             m = independent_rows(A, b, v, rows, rhs)
             if m < 0:
                 return INACCURATE
-            B, pivots = B[: m + base], pivots[: m + base]
+            B, pivots = B[: m + passive], pivots[: m + passive]
             _, smallest_pivot = eliminate(
-                rows[:m], rhs[:m], M, h, J_points, base, float_workspace, B, pivots
+                rows[:m], rhs[:m], M, h, J_points, passive, float_workspace, B, pivots
             )
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE
-        nb = n - m - base
+        nb = n - m - passive
         space = Parametrisation(
             take_matrix(float_workspace, n, nb + 1),
             take_vector(int_workspace, n),
