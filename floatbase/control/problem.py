@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeAlias, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -53,7 +53,8 @@ INCONSISTENCY_TOLERANCE = 1e-6
 class AssumedModel(NamedTuple):
     """What a controller assumes instead of eqs. (5), (7) and (28), by default nothing else.
 
-    A `modify_qp` whose class has a property `assumed_model` of this type runs compiled.
+    A `modify_qp` runs compiled if its own class has `compiled_as = "assumed model"`, and these
+    attributes.
     """
 
     mass: float = 1.0  # multiple of M and h
@@ -316,12 +317,11 @@ def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
 
 def assumed_model(problem: Problem) -> AssumedModel | None:
     """Return the model that a problem assumes, or None if its `modify_qp` is anything else."""
-    if problem.modify_qp is None:
+    change = problem.modify_qp
+    if change is None:
         return AssumedModel()
-    # not that of a base class, which does not know what a subclass changes
-    if "assumed_model" not in vars(type(problem.modify_qp)):
-        return None
-    return cast(AssumedModel, cast(Any, problem.modify_qp).assumed_model)
+    is_compiled = vars(type(change)).get("compiled_as") == "assumed model"
+    return cast(AssumedModel, change) if is_compiled else None
 
 
 def assemble_qp(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
 from floatbase._validation import Value, as_bool, as_instance, as_positive, as_strings, checked
-from floatbase.control.problem import AssumedModel
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import unknown_name
 from floatbase.qp import QP, ConstraintLabel
@@ -52,6 +52,7 @@ class ModelMismatch(Value):
     >>> controller = fb.WholeBodyController(robot, contacts, tasks, modify_qp=mismatch)
     """
 
+    compiled_as: ClassVar[str] = "assumed model"
     mass: float = field(default=1.0, metadata=checked(as_positive))
     gravity: bool = field(default=True, metadata=checked(as_bool))
     velocity_forces: bool = field(default=True, metadata=checked(as_bool))
@@ -64,12 +65,6 @@ class ModelMismatch(Value):
     def is_exact(self) -> bool:
         """Whether the controller assumes eq. (7) without changes."""
         return self == ModelMismatch()
-
-    @property
-    def assumed_model(self) -> AssumedModel:
-        """The mismatch in the form that runs compiled."""
-        numbers = self.mass, self.gravity, self.velocity_forces, self.drift
-        return AssumedModel(*numbers, tuple(self.ignored_contacts), self.underactuated, self.cones)
 
     def assumed_equations(self, eom: EquationsOfMotion) -> EquationsOfMotion:
         """Return the equations of motion that the controller assumes.

@@ -393,9 +393,18 @@ def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_sm
     assert compiled(q, v, 0.0) is not None
     assert rtsys.get_allocation_stats() == before
     counts.memsys_disable_stats()
-    compiled._sizes = 2000, compiled._sizes[1]
-    with ThreadPoolExecutor() as others, raises(MemoryError, "workspace"):
-        others.submit(compiled, q, v, 0.0).result()  # a thread that has no memory yet
+    inputs, ints = compiled.default_inputs, compiled.workspace()[1]
+    given = (
+        q,
+        v,
+        inputs.packed,
+        *compiled.tables,
+        np.empty(2000),
+        ints,
+        compiled.empty_result(inputs),
+    )
+    with raises(MemoryError, "workspace"):
+        tick.tick(*given, tick.N_STAGES)
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])
