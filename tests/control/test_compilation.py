@@ -394,17 +394,9 @@ def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_sm
     assert rtsys.get_allocation_stats() == before
     counts.memsys_disable_stats()
     inputs, ints = compiled.default_inputs, compiled.workspace()[1]
-    given = (
-        q,
-        v,
-        inputs.packed,
-        *compiled.tables,
-        np.empty(2000),
-        ints,
-        compiled.empty_result(inputs),
-    )
+    small, result = np.empty(2000), compiled.empty_result(inputs)
     with raises(MemoryError, "workspace"):
-        tick.tick(*given, tick.N_STAGES)
+        tick.tick(q, v, inputs.packed, *compiled.tables, small, ints, result, tick.N_STAGES)
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])
