@@ -344,7 +344,7 @@ def _numbers(ranges: str) -> set[str]:
 
 # largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
 BUDGETS = {
-    "library": 16010, "lessons": 12700, "viewer": 4100, "tests": 23300, "benchmarks": 2300,
+    "library": 15700, "lessons": 12700, "viewer": 4100, "tests": 22000, "benchmarks": 2450,
     "docstrings": 16000,
 }  # fmt: skip
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import floatbase as fb
-from floatbase.robots import file_loader
 
 if TYPE_CHECKING:
     from floatbase.playground import Playground
@@ -51,11 +50,7 @@ def _parser() -> argparse.ArgumentParser:
         "shapes (default: the lowest ends of the limbs)",
     )
     view.add_argument(
-        "--foot-radius",
-        type=float,
-        default=None,
-        metavar="M",
-        help="radius of ball feet at these links [m]",
+        "--foot-radius", type=float, metavar="M", help="radius of ball feet at these links [m]"
     )
     view.add_argument(
         "--posture",
@@ -65,22 +60,13 @@ def _parser() -> argparse.ArgumentParser:
         help="joint positions [rad or m]; a * stands for any characters, as in '*_knee=0.6'; or "
         "the name of a keyframe in an MJCF",
     )
-    view.add_argument(
-        "--package-dirs",
-        nargs="+",
-        default=[],
-        metavar="FOLDER",
-        help="folders of a URDF's meshes named package://…",
-    )
+    meshes = "folders of a URDF's meshes named package://…"
+    view.add_argument("--package-dirs", nargs="+", default=[], metavar="FOLDER", help=meshes)
     view.add_argument(
         "--fixed", action="store_true", help="fix the root link of the file to the ground"
     )
-    view.add_argument(
-        "--friction",
-        type=float,
-        default=0.7,
-        help="friction coefficient of the ground (default: 0.7)",
-    )
+    friction = "friction coefficient of the ground (default: 0.7)"
+    view.add_argument("--friction", type=float, default=0.7, help=friction)
     view.add_argument("--background", default="light", help="white, light or dark (default: light)")
     view.add_argument("--port", type=int, default=0, help="port of the page (default: a free port)")
     view.add_argument(
@@ -91,13 +77,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     commands.add_parser("recall", help="ask questions of lessons that you have worked through")
     lab = commands.add_parser("lab", help="open the course in JupyterLab")
-    lab.add_argument(
-        "folder",
-        nargs="?",
-        type=Path,
-        default=Path(),
-        help="your copy of the lessons (default: this folder)",
-    )
+    folder = "your copy of the lessons (default: this folder)"
+    lab.add_argument("folder", nargs="?", type=Path, default=Path(), help=folder)
     lab.usage = (
         "floatbase lab [FOLDER] [options of JupyterLab, such as --no-browser or --port=9000]"
     )
@@ -176,20 +157,20 @@ def _load_robot(options: argparse.Namespace) -> fb.Robot:
     described: dict[str, Any] = {
         "feet": options.feet,
         "foot_radius": options.foot_radius,
-        "posture": _posture(options.posture),
+        "posture": _posture(options.posture, options.robot),
     }
-    load_file = file_loader(options.robot)
-    if load_file is None:
-        return fb.load(options.robot, **described)
     if options.fixed:
         described["floating"] = False
     if options.package_dirs:
         described["package_dirs"] = options.package_dirs
-    return load_file(options.robot, **described)
+    return fb.load(options.robot, **described)
 
 
-def _posture(entries: Sequence[str]) -> dict[str, float] | None:
-    """Return joint positions given as JOINT=ANGLE, or None if there are none."""
+def _posture(entries: Sequence[str], robot: str) -> dict[str, float] | str | None:
+    """Return joint positions given as JOINT=ANGLE, the name of a keyframe, or None by default."""
+    is_mjcf = robot.lower().endswith((".xml", ".mjcf"))
+    if is_mjcf and len(entries) == 1 and "=" not in entries[0]:
+        return entries[0]
     angles = {}
     for entry in entries:
         joint, _, angle = entry.rpartition("=")
@@ -198,7 +179,7 @@ def _posture(entries: Sequence[str]) -> dict[str, float] | None:
         except ValueError:
             raise fb.FloatbaseError(
                 f"--posture has {entry!r}. Write the name of a joint and its position, as in "
-                f"'*_knee=0.6'."
+                f"'*_knee=0.6', or alone the name of a keyframe of an MJCF."
             ) from None
     return angles or None
 
@@ -227,10 +208,8 @@ def start_when_connected(page: Playground, ended: threading.Event) -> None:
 
 def _run_viewer(options: argparse.Namespace, given: Sequence[str]) -> int:
     """Show a robot until Ctrl-C or SIGTERM; `given` are the arguments of the command line."""
-    from floatbase.playground import (
-        Playground,
-        Settings,
-    )  # imports MuJoCo and the viewer, which the other commands do not need
+    # imports MuJoCo and the viewer, which the other commands do not need
+    from floatbase.playground import Playground, Settings
 
     ended = threading.Event()
     before = {

@@ -25,6 +25,15 @@ def minimum_jerk(s: float) -> tuple[float, float, float]:
     return s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * w * w, 60.0 * w * (1.0 - 2.0 * s)
 
 
+def bump(s: float) -> tuple[float, float, float]:
+    """Return a smooth rise from 0 to 1 and back for s from 0 to 1, with two derivatives.
+
+    The first two derivatives are zero at both ends.
+    """
+    w = s * (1.0 - s)
+    return 64.0 * w**3, 192.0 * w * w * (1.0 - 2.0 * s), 384.0 * w * (1.0 - 5.0 * w)
+
+
 def convex_hull(points: Array) -> Array:
     """Return the corners of the convex hull of n ≥ 1 points, shape (k, 2), counter-clockwise.
 

@@ -172,11 +172,8 @@ def _is_storable(text: str) -> bool:
 
 def as_strings(name: str, value: Any) -> tuple[str, ...]:
     """Return `value` as a tuple after checking that it is a list of strings, not one string."""
-    if (
-        isinstance(value, Sequence)
-        and not isinstance(value, str)
-        and all(isinstance(entry, str) for entry in value)
-    ):
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    if is_list and all(isinstance(entry, str) for entry in value):
         return tuple(as_string(f"an entry of {name}", entry) for entry in value)
     example = value if isinstance(value, str) and len(value) <= MAX_REPR else "…"
     raise InputError(
@@ -290,11 +287,9 @@ def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "
         )
     if array.shape != shape and not _shape_matches(array.shape, shape):
         required = f"have shape {_shape_str(shape)}" if shape else "be a single number"
-        hint = (
-            " To select a single row, write rows[:1] instead of rows[0]."
-            if array.ndim == 1 and shape[:-1] in ((None,), (1,))
-            else ""
-        )
+        hint = ""
+        if array.ndim == 1 and shape[:-1] in ((None,), (1,)):
+            hint = " To select a single row, write rows[:1] instead of rows[0]."
         raise InputError(
             f"{name} has shape {array.shape}, but it must "
             f"{required}{f' [{unit}]' if unit else ''}.{hint}"
@@ -306,11 +301,9 @@ def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "
         or (bounded := np.abs(array) <= MAX_MAGNITUDE).all()
     ):
         at = tuple(np.argwhere(~bounded)[0].tolist())
-        place = (
-            f"contains {array[at]:g} at index {list(at)}, but every entry must be"
-            if shape
-            else f"is {array[at]:g}, but it must be"
-        )
+        place = f"is {array[at]:g}, but it must be"
+        if shape:
+            place = f"contains {array[at]:g} at index {list(at)}, but every entry must be"
         raise InputError(
             f"{name} {place} a finite "
             f"number{f' of magnitude at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}."
@@ -350,11 +343,9 @@ def as_number(
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if minimum <= result <= maximum:
         return result
-    bounds = (
-        "a finite number"
-        if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE
-        else f"from {minimum:g} to {maximum:g}"
-    )
+    bounds = f"from {minimum:g} to {maximum:g}"
+    if minimum == -MAX_MAGNITUDE and maximum == MAX_MAGNITUDE:
+        bounds = "a finite number"
     raise InputError(
         f"{name} is {result:g}, but it must be {bounds}{f' [{unit}]' if unit else ''}."
     )
@@ -370,15 +361,11 @@ def as_positive(
     result = float(value if isinstance(value, float) else as_array(name, value, (), unit))
     if _MIN_POSITIVE <= result <= maximum or (0.0 <= result < _MIN_POSITIVE and allow_zero):
         return result
-    bound = (
-        f"at most {maximum:g}"
-        if result > maximum
-        else "at least 0"
-        if allow_zero
-        else f"at least {_MIN_POSITIVE:g}"
-        if result > 0.0
-        else "greater than 0"
-    )
+    bound = "at least 0" if allow_zero else "greater than 0"
+    if result > maximum:
+        bound = f"at most {maximum:g}"
+    elif result > 0.0:
+        bound = f"at least {_MIN_POSITIVE:g}"
     raise InputError(f"{name} is {result:g}, but it must be {bound}{f' [{unit}]' if unit else ''}.")
 
 

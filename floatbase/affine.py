@@ -74,9 +74,8 @@ class Affine(Value):
     def __init__(
         self, A: npt.ArrayLike, b: npt.ArrayLike, blocks: Mapping[str, slice] = _NO_BLOCKS
     ):
-        values = (
-            self.__dict__
-        )  # written directly, since user-defined tasks make a map at every tick
+        # written directly, since user-defined tasks make a map at every tick
+        values = self.__dict__
         values["A"] = A = as_array("A", A, (None, None))
         values["b"], values["blocks"] = as_array("b", b, (len(A),)), as_blocks(blocks)
 

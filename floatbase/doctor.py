@@ -24,17 +24,10 @@ def report() -> str:
     ]
     for extra, names in _extras().items():
         missing = [name for name in names if _version(name) is None]
-        lines.append(
-            f'{extra}: {", ".join(missing)} missing; pip install "floatbase[{extra}]"'
-            if missing
-            else f"{extra}: installed"
-        )
-    browser = browser_path()
-    lines.append(
-        f"browser for films: {browser}"
-        if browser
-        else "browser for films: none found; install Chromium or Chrome (apt install chromium)"
-    )
+        advice = f'{", ".join(missing)} missing; pip install "floatbase[{extra}]"'
+        lines.append(f"{extra}: {advice if missing else 'installed'}")
+    none = "none found; install Chromium or Chrome (apt install chromium)"
+    lines.append(f"browser for films: {browser_path() or none}")
     return "\n".join(lines)
 
 

@@ -113,7 +113,7 @@ def require(module: str, extra: str) -> ModuleType:
 def warn(message: str, category: type[Warning]) -> None:
     """Issue a warning that points at the code that called the package."""
     frame, level = inspect.currentframe(), 1
-    while frame is not None and frame.f_globals["__name__"].startswith("floatbase."):
+    while frame is not None and str(frame.f_globals.get("__name__")).startswith("floatbase."):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, category, stacklevel=level)
 

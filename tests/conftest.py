@@ -27,7 +27,6 @@ SLOWEST = (
     "test_hub",
     "test_voila",
     "test_playground_page",
-    "test_convert",
     "test_main",
 )
 ENDING = 5.0  # s that a process may take to end after the tests have ended it

@@ -18,6 +18,7 @@ import harness  # noqa: E402
 import peer_problems  # noqa: E402
 import peer_wire  # noqa: E402
 import peers  # noqa: E402
+import robots_tried  # noqa: E402
 import soak  # noqa: E402
 
 
@@ -114,3 +115,15 @@ def test_a_table_has_a_line_for_each_row_and_a_page_its_parts(tmp_path):
     harness.write(str(tmp_path / "some.py"), "Title", "Words.", table)
     page = (tmp_path / "some.md").read_text(encoding="utf-8")
     assert page == f"# Title\n\nWords.\n\n{table}\n"
+
+
+def test_the_page_of_robots_has_the_columns_of_its_program():
+    text = robots_tried.PAGE.with_suffix(".md").read_text(encoding="utf-8")
+    assert f"| {robots_tried.HEADER} |" in text
+
+
+def test_files_of_packages_that_are_not_installed_are_named(tmp_path):
+    rows = [robots_tried.row(*file) for file in robots_tried.found(str(tmp_path))]
+    assert {row[0] for row in rows} >= {"mjlab", "pybullet"}
+    assert all("not installed" in row and len(row) == len(rows[0]) for row in rows)
+    assert len(rows[0]) == robots_tried.HEADER.count("|") + 1

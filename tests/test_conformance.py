@@ -14,6 +14,7 @@ from dataclasses import is_dataclass
 from datetime import datetime
 from functools import cache, partial
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -119,6 +120,7 @@ def right():
         "feasible_polygon.box": (-1.0, 1.0, -1.0, 1.0),
         "with_floating_base.robot": judges.load("ur5"),
         "load.name": "go2", "load_urdf.path": str(judges.load("ur5").urdf),
+        "load_mjcf.path": str(Path(__file__).parent / "robots/hopper.xml"),
         "run_plots.friction_used.forces": record().measured, "block": "tau", "row": 0,
         **{f"{name}.qp": table_top() for name in ("feasible_polygon", "plot", "plot_optimum")},
         "slider_panel.draw": lambda ranges: "", "ranges": (0.0, 1.0, 2.0),
@@ -211,7 +213,9 @@ def right_for(callee, parameter):
 
 def rights_of(callee):
     """Right arguments for all parameters that have no default."""
-    return {p.name: right_for(callee, p) for p in callee.parameters if p.default is p.empty}
+    optional = ("file_options",)
+    required = [p for p in callee.parameters if p.default is p.empty and p.name not in optional]
+    return {p.name: right_for(callee, p) for p in required}
 
 
 @cache

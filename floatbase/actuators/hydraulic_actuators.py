@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
@@ -100,11 +101,8 @@ class HydraulicActuators:
         max_lever_angle: npt.ArrayLike | None = None,
     ):
         self.robot = as_instance("robot", robot, Robot)
-        hydraulics = (
-            Hydraulics()
-            if hydraulics is None
-            else as_instance("hydraulics", hydraulics, Hydraulics)
-        )
+        hydraulics = Hydraulics() if hydraulics is None else hydraulics
+        as_instance("hydraulics", hydraulics, Hydraulics)
         for joint, limit in zip(robot.joint_names, robot.torque_limits, strict=True):
             kind = robot.model.joints[robot.model.getJointId(joint)].shortname()
             if not kind.startswith("JointModelR"):
@@ -208,14 +206,8 @@ class HydraulicActuators:
             as_array("tau_desired", tau_desired, (cylinders.d,), "N·m"), geometry
         )
         v = as_array("v_joints", v_joints, (cylinders.d,), "rad/s")
-        steps = max(
-            1,
-            int(
-                np.ceil(
-                    as_positive("dt", dt, "s", maximum=_MAX_DURATION) / _MAX_STEP - _STEP_ROUNDING
-                )
-            ),
-        )
+        time = as_positive("dt", dt, "s", maximum=_MAX_DURATION)
+        steps = max(1, ceil(time / _MAX_STEP - _STEP_ROUNDING))
         state = (self.state.opening, self.state.pressures, self.state.integral)
         for _ in range(steps):
             state = self._advance(state, force, geometry, v, dt / steps)

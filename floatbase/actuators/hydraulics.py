@@ -103,11 +103,8 @@ class Hydraulics(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for small, large in (
-            ("rod", "bore"),
-            ("crank", "base"),
-            ("tank_pressure", "supply_pressure"),
-        ):
+        parts = {"rod": "bore", "crank": "base", "tank_pressure": "supply_pressure"}
+        for small, large in parts.items():
             size, bound = getattr(self, small), getattr(self, large)
             if size >= bound:
                 raise InputError(
@@ -269,9 +266,8 @@ class Cylinders(Value):
             _dead_volume=hydraulics.dead_volume * scale,
             _valve_gain=hydraulics.valve_gain * scale,
             _leakage=hydraulics.leakage * scale,
-            _best_gamma=float(
-                np.arccos(hydraulics.crank / hydraulics.base)
-            ),  # γ with the crank perpendicular to the cylinder
+            # γ with the crank perpendicular to the cylinder
+            _best_gamma=float(np.arccos(hydraulics.crank / hydraulics.base)),
         )
 
     @property
@@ -532,13 +528,9 @@ class Cylinders(Value):
         piston velocity. Leakage is left to the integral of the force loop.
         """
         valve_force_rate = force_rate + geometry.stiffness * geometry.lever * v
-        full_opening_rate = (
-            self.orifice_flow(self.line_pressures(valve_force_rate) - pressures)
-            / geometry.compliance
-        )
-        return valve_force_rate / np.maximum(
-            np.sign(valve_force_rate) * self.force(full_opening_rate), _MIN_GAIN
-        )
+        flows = self.orifice_flow(self.line_pressures(valve_force_rate) - pressures)
+        gain = np.sign(valve_force_rate) * self.force(flows / geometry.compliance)
+        return valve_force_rate / np.maximum(gain, _MIN_GAIN)
 
     def power(
         self, x: Array, pressures: Array, geometry: CylinderGeometry, v: Array
@@ -562,14 +554,11 @@ class Cylinders(Value):
             The power flows.
         """
         flows, line = self.valve_flows(x, pressures), self.line_pressures(x)
-        stored = geometry.compliance * pressures * self.pressure_rates(x, pressures, geometry, v)
+        filling = geometry.compliance * pressures * self.pressure_rates(x, pressures, geometry, v)
         leaked = pressures * self.leakage_flow(pressures)
         pump, valve, leakage, stored = (
-            np.sum(p, axis=0) for p in (line * flows, (line - pressures) * flows, leaked, stored)
+            read_only(np.sum(power, axis=0))
+            for power in (line * flows, (line - pressures) * flows, leaked, filling)
         )
-        return PowerBalance(
-            *map(
-                read_only,
-                (pump, self.force(pressures) * geometry.lever * v, valve, leakage, stored),
-            )
-        )
+        joint = read_only(self.force(pressures) * geometry.lever * v)
+        return PowerBalance(pump, joint, valve, leakage, stored)

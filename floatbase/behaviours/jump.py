@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._geometry import minimum_jerk
+from floatbase._geometry import bump, minimum_jerk
 from floatbase._validation import (
     Array,
     Value,
@@ -169,12 +169,8 @@ class JumpPlan(Value):
             s, rate, acceleration = minimum_jerk(u)
             T = self.push - self.crouch
             return s * down, rate / T * down, acceleration / T**2 * down
-        s = min(t, self.take_off) - self.push
-        return (
-            np.array([0.0, -self.depth]) + self.acceleration * s * s / 2.0,
-            self.acceleration * s,
-            self.acceleration,
-        )
+        s, a = min(t, self.take_off) - self.push, self.acceleration
+        return np.array([0.0, -self.depth]) + a * s * s / 2.0, a * s, a
 
 
 class Jump:
@@ -388,11 +384,11 @@ class Jump:
         """Return how much higher the ground is at the landing place than at the start [m]."""
         if self._ground is None:
             return 0.0
-        levels = [
-            self._ground_level(self._standing.point(name)[:2] + [self._distance, 0.0] + around)
-            for name in self._all_contacts.names
-            for around in foot_outline(self._robot.foot(name), 0.0)
-        ]
+        levels = []
+        for name in self._all_contacts.names:
+            landing = self._standing.point(name)[:2] + [self._distance, 0.0]
+            outline = foot_outline(self._robot.foot(name), 0.0)
+            levels += [self._ground_level(landing + around) for around in outline]
         if max(levels) - min(levels) > _MAX_UNEVENNESS:
             raise InputError(
                 f"With a distance of {self._distance:g} m, the feet would land at different "
@@ -417,9 +413,8 @@ class Jump:
             return self._standing.com + planned[0], planned[1], planned[2]
         # critical damping: after a fall to the same height, the body sinks by v / (e rate), as far
         # as in the crouch
-        rate = max(
-            self._plan.velocity[1] / (e * self._plan.depth), sqrt(self._robot.gravity / self._leg)
-        )
+        pendulum = sqrt(self._robot.gravity / self._leg)
+        rate = max(self._plan.velocity[1] / (e * self._plan.depth), pendulum)
         s, offset = t - self._since, self._com - self._goal
         slope, decay = self._com_velocity + rate * offset, np.exp(-rate * s)
         position = decay * (offset + slope * s)
@@ -432,8 +427,7 @@ class Jump:
         plan, standing, gravity = self._plan, self._standing, self._robot.gravity
         s, T = max(t - self._since, 0.0), plan.touchdown - plan.take_off
         u = min(s / T, 1.0)
-        w = u * (1.0 - u)
-        fraction, rate, bend = minimum_jerk(u)
+        (fraction, rate, bend), (rise, rise_rate, rise_bend) = minimum_jerk(u), bump(u)
         fall = np.array([0.0, 0.0, -gravity])
         last = standing.point(foot) - standing.com + [plan.lead, 0.0, 0.0]
         first = last - [plan.lead + self._plan.com_offset(plan.take_off)[0][0], 0.0, 0.0]
@@ -441,10 +435,9 @@ class Jump:
         change = last - first
         return (
             self._com + self._com_velocity * s + fall * s * s / 2.0
-            + first + fraction * change + 64.0 * w**3 * tuck,
-            self._com_velocity + fall * s
-            + rate / T * change + 192.0 * w * w * (1.0 - 2.0 * u) / T * tuck,
-            fall + bend / T**2 * change + 384.0 * w * (1.0 - 5.0 * w) / T**2 * tuck,
+            + first + fraction * change + rise * tuck,
+            self._com_velocity + fall * s + rate / T * change + rise_rate / T * tuck,
+            fall + bend / T**2 * change + rise_bend / T**2 * tuck,
         )  # fmt: skip
 
     def _controller(self, contacts: Contacts, **options: Any) -> WholeBodyController:

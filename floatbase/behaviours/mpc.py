@@ -101,8 +101,7 @@ class MPC(Walk):
 
     may_fly = True
     _made_anew = Walk._made_anew | {
-        "_horizon", "_contact_offsets", "_motion", "_solved", "_measured",
-        "_flight",
+        "_horizon", "_contact_offsets", "_motion", "_solved", "_measured", "_flight",
     }  # fmt: skip
 
     def __init__(
@@ -148,22 +147,16 @@ class MPC(Walk):
 
     def _clear(self) -> None:
         super()._clear()
-        robot = self.robot
-        posture = self._posture
-        limits = self._controllers.limits
+        robot, posture, limits = self.robot, self._posture, self._controllers.limits
         data = robot.model.createData()
         pin.ccrba(robot.model, data, posture.state.q, np.zeros(robot.nv))
         mu = min(
             _square_pyramid_mu(FrictionPolyhedron(_UP, contact.mu, *limits.polyhedron_options))
             for contact in posture.contacts.friction_contacts
         )
+        inertia, weights = np.array(data.Ig.inertia), self._state_weights
         self._horizon = HorizonQP(
-            robot.mass,
-            np.array(data.Ig.inertia),
-            self._dt,
-            mu,
-            gravity=robot.gravity,
-            state_weights=self._state_weights,
+            robot.mass, inertia, self._dt, mu, gravity=robot.gravity, state_weights=weights
         )
         self._contact_offsets = {
             name: posture.contacts.only(name).positions(posture.state)[0]

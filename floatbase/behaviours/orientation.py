@@ -45,10 +45,7 @@ def pitch_and_yaw(
         p2, y2 = (after - 2.0 * now + before) / _DIFFERENCE_STEP**2
         R = pin.rpy.rpyToMatrix(0.0, now[0], now[1])
         yaw_axis, pitch_axis = np.array([0.0, 0.0, 1.0]), R[:, 1]  # the axes of yaw and of pitch
-        return (
-            R,
-            y1 * yaw_axis + p1 * pitch_axis,
-            y2 * yaw_axis + p2 * pitch_axis + y1 * p1 * cross(yaw_axis, pitch_axis),
-        )
+        acceleration = y2 * yaw_axis + p2 * pitch_axis + y1 * p1 * cross(yaw_axis, pitch_axis)
+        return R, y1 * yaw_axis + p1 * pitch_axis, acceleration
 
     return path

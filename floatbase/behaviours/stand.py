@@ -65,15 +65,11 @@ class Stand(Walk):
         margin: float = 0.03,
         **options: Any,
     ):
-        gait = (
-            Gait(dict.fromkeys(as_instance("contacts", contacts, Contacts).names, 0.0), 1.0, 0.5)
-            if stepping_gait is None
-            else stepping_gait
-        )
-        self._feet = contacts
-        self._standing_gait = replace(
-            as_instance("stepping_gait", gait, Gait, "Gait.trot(robot)"), start=0.0, stop=0.0
-        )
+        self._feet, gait = as_instance("contacts", contacts, Contacts), stepping_gait
+        if gait is None:
+            gait = Gait(dict.fromkeys(contacts.names, 0.0), 1.0, 0.5)
+        as_instance("stepping_gait", gait, Gait, "Gait.trot(robot)")
+        self._standing_gait = replace(gait, start=0.0, stop=0.0)
         self.stepping_gait = stepping_gait
         self.margin = as_positive("margin", margin, "m", allow_zero=True, maximum=1.0)
         if {"velocity", "yaw_rate", "gait"} & set(options):
@@ -132,11 +128,8 @@ class Stand(Walk):
 
         def margin(gait: Gait) -> float:
             standing_feet = [name for name in self._feet.names if gait.offsets.get(name) != 0.0]
-            return (
-                support_margin(dcm, self._feet.only(*standing_feet).positions(state)[:, :2])
-                if standing_feet
-                else -inf
-            )
+            points = self._feet.only(*standing_feet).positions(state)
+            return support_margin(dcm, points[:, :2]) if len(points) else -inf
 
         best = max(others, key=margin, default=first)
         return best if margin(best) >= margin(first) + _MIN_MARGIN_GAIN else first

@@ -25,7 +25,7 @@ _SIGNIFICANT_MULTIPLIER, _SIGNIFICANT_SLOPE = 1e-12, 1e6
 def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list[Task], list[int]]:
     """Return tasks as one list, and the number of tasks in each level."""
     are_levels = [
-        isinstance(each, list | tuple) and not hasattr(each, "residual") for each in tasks
+        isinstance(part, list | tuple) and not hasattr(part, "residual") for part in tasks
     ]
     if not any(are_levels):
         return list(tasks), []  # type: ignore[arg-type]
@@ -52,10 +52,8 @@ def with_fixed_residuals(
         part[:, qp.blocks[block]] = residual.A
         rows.append(part)
         right.append(residual.A @ x[qp.blocks[block]])
-        names += [
-            ConstraintLabel(f"task {task.name} {i}", "task", task.name, i)
-            for i in range(len(residual.b))
-        ]
+        for i in range(len(residual.b)):
+            names.append(ConstraintLabel(f"task {task.name} {i}", "task", task.name, i))
     return np.vstack(rows), np.concatenate(right), names
 
 
@@ -82,15 +80,9 @@ def solve_levels(
         change, T, rank = in_residuals(level, terms, free, x)
         found = solve(change, solver)
         x = x + T @ found.x
-        solutions.append(
-            replace(
-                found,
-                qp=level,
-                x=x,
-                earlier_violations=solutions[-1].violations if solutions else {},
-                earlier_multipliers=dict(kept),
-            )
-        )
+        before = solutions[-1].violations if solutions else {}
+        solution = replace(found, qp=level, x=x, earlier_violations=before)
+        solutions.append(replace(solution, earlier_multipliers=dict(kept)))
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
         h, penalties = np.maximum(h, qp.G @ x + FEASIBILITY_TOLERANCE * qp.row_norms), None
@@ -98,10 +90,8 @@ def solve_levels(
         # relaxed like the others, these rows would let the torques change by far more than that
         scaled = found.inequality_multipliers * qp.row_norms
         slopes = np.concatenate([qp.g, qp.H @ x, scaled])
-        least = max(
-            _SIGNIFICANT_MULTIPLIER * np.max(np.abs(slopes)),
-            _SIGNIFICANT_SLOPE * found.residuals.stationarity,
-        )
+        rounding = _SIGNIFICANT_SLOPE * found.residuals.stationarity
+        least = max(_SIGNIFICANT_MULTIPLIER * np.max(np.abs(slopes)), rounding)
         active = np.flatnonzero(scaled > least)
         active_names = [cast(ConstraintLabel, qp.inequality_names[i]) for i in active]
         kept.update(zip(active_names, found.inequality_multipliers[active].tolist(), strict=True))

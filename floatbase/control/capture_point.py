@@ -76,11 +76,8 @@ def _coefficients(
     """Return G and h of the inequalities [m/s²]."""
     state, points = eom.state, eom.contacts.positions(eom.state)
     normals, offsets = _edges(points[:, :2])
-    height = as_positive(
-        "height of the centre of mass above the contact points",
-        state.com[2] - points[:, 2].mean(),
-        "m",
-    )
+    name = "height of the centre of mass above the contact points"
+    height = as_positive(name, state.com[2] - points[:, 2].mean(), "m")
     omega = np.sqrt(eom.robot.gravity / height)
     # ξ(T) = still + gain c̈
     still = state.com[:2] + (horizon + 1.0 / omega) * state.com_velocity[:2]

@@ -459,12 +459,8 @@ class WholeBodyController:
         problems without a compiled form, need the reference backend.
         """
         t, target_array = self._checked_inputs(v, t, targets)
-        command = self._attempt(q, v, t, target_array)
-        if command is not None:
-            return command
-        for softer in self._softer_controllers:
-            command = softer._attempt(q, v, t, target_array)
-            if command is not None:
+        for controller in (self, *self._softer_controllers):
+            if (command := controller._attempt(q, v, t, target_array)) is not None:
                 return command
         return None
 
@@ -596,12 +592,8 @@ class WholeBodyController:
         if (weight := contact_weight_of(self._problem.tasks)) is not None:
             problem = _softened(problem, weight)
         if limits is not None:
-            limits.check_names(
-                problem.contacts.names,
-                self.contacts.names,
-                _foot_frames(self.robot),
-                before=self.limits,
-            )
+            names = *problem.contacts.names, *self.contacts.names
+            limits.check_names(names, _foot_frames(self.robot), before=self.limits)
         other = self._with_problem(problem)
         if other._compiled is None:
             problem.check()

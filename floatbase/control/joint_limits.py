@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -80,6 +81,16 @@ def _as_period(name: str, value: Any) -> float:
     return period
 
 
+def check_parameters(cls: Any, names: Iterable[str]) -> None:
+    """Raise `InputError` for a name that is not one of the fields of a dataclass."""
+    for name in names:
+        if name not in cls.__dataclass_fields__:
+            raise InputError(
+                f"{cls.__name__} has no parameter {name!r}. It has "
+                f"{', '.join(cls.__dataclass_fields__)}."
+            )
+
+
 def as_weight(name: str, value: Any) -> float | None:
     """Check and return the weight of a soft constraint, or None for a hard constraint."""
     return None if value is None else as_positive(name, value, maximum=_MAX_WEIGHT)
@@ -133,10 +144,8 @@ class JointLimits(Value):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        sizes = {
-            name: len(getattr(self, name))
-            for name in ("lower", "upper", "velocity", "acceleration", "braking")
-        }
+        names = ("lower", "upper", "velocity", "acceleration", "braking")
+        sizes = {name: len(getattr(self, name)) for name in names}
         if len(set(sizes.values())) > 1:
             raise InputError(f"Joint limits need one number per joint, but the sizes are {sizes}.")
         if np.any(self.lower > self.upper):
@@ -180,12 +189,7 @@ class JointLimits(Value):
             If an argument has a wrong type, shape or value.
         """
         limits = _limits_of(as_instance("robot", robot, Robot, 'fb.load("go2")'))
-        unknown = [name for name in changes if name not in cls.__dataclass_fields__]
-        if unknown:
-            raise InputError(
-                f"JointLimits has no parameter {unknown[0]!r}. It has "
-                f"{', '.join(cls.__dataclass_fields__)}."
-            )
+        check_parameters(cls, changes)
         if torque_limits is not None:
             torques = as_torque_limits(robot.d, torque_limits)
             changes = {"braking": _braking(robot, torques), **changes}
@@ -301,10 +305,8 @@ class JointLimits(Value):
         planned = as_array("qdd", qdd, (robot.nv,), "m/s² or rad/s²")[robot.nv - robot.d :]
         least, largest = self.bounds(q, v)
         tolerance = _REACHED_TOLERANCE * (1.0 + np.abs(planned))
-        reached: npt.NDArray[np.bool_] = (planned >= largest - tolerance) | (
-            planned <= least + tolerance
-        )
-        return reached
+        reached: npt.NDArray[np.bool_] = planned >= largest - tolerance
+        return reached | (planned <= least + tolerance)
 
     def _joints_of(self, state: State) -> tuple[Array, Array]:
         """Return positions [rad or m] and velocities [rad/s or m/s] of the joints, (d,) each."""
@@ -350,18 +352,17 @@ class JointLimits(Value):
             Names such as "FL_calf_joint position upper", for bounded joints only. The second word
             names the strictest limit in this state.
         """
-        upper, lower = self._upper_bounds(self.upper - q, v), self._upper_bounds(q - self.lower, -v)
-        return tuple(
-            ConstraintLabel(
-                f"{names[joint]} {_KINDS[kinds[joint]]} {side}",
-                f"{side} {_KINDS[kinds[joint]]} limit",
-                names[joint],
-            )
-            for side, (_, kinds), bounded in zip(
-                ("upper", "lower"), (upper, lower), self.bounded, strict=True
-            )
-            for joint in np.flatnonzero(bounded)
-        )
+        _, upper_kinds = self._upper_bounds(self.upper - q, v)
+        _, lower_kinds = self._upper_bounds(q - self.lower, -v)
+        labels = []
+        sides = zip(("upper", "lower"), (upper_kinds, lower_kinds), self.bounded, strict=True)
+        for side, kinds, bounded in sides:
+            for i in np.flatnonzero(bounded):
+                kind, joint = _KINDS[kinds[i]], names[i]
+                labels.append(
+                    ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
+                )
+        return tuple(labels)
 
     def rows(self, state: State) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
         """Return G, h and names of the inequalities G q̈ ≤ h at a state.
@@ -420,13 +421,10 @@ def _limits_of(robot: Robot) -> JointLimits:
     lower[index], upper[index] = least, largest
     at = _position_indices(robot)
     velocity = np.array(model.velocityLimit[robot.nv - d :])
-    return JointLimits(
-        lower=np.where(at >= 0, lower[at], -np.inf),
-        upper=np.where(at >= 0, upper[at], np.inf),
-        velocity=np.where(velocity > 0.0, velocity, np.inf),  # 0: not in the URDF
-        acceleration=np.full(d, np.inf),
-        braking=_braking(robot, robot.torque_limits),
-    )
+    lower, upper = np.where(at >= 0, lower[at], -np.inf), np.where(at >= 0, upper[at], np.inf)
+    velocity = np.where(velocity > 0.0, velocity, np.inf)  # 0: not in the URDF
+    braking = _braking(robot, robot.torque_limits)
+    return JointLimits(lower, upper, velocity, np.full(d, np.inf), braking)
 
 
 def _braking(robot: Robot, torque_limits: Array) -> Array:

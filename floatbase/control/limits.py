@@ -29,7 +29,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.control.joint_limits import JointLimits, as_weight
+from floatbase.control.joint_limits import JointLimits, as_weight, check_parameters
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -133,13 +133,11 @@ class LinearInequality(Value):
             If the shapes do not fit.
         """
         n = getattr(eom, SIZES[self.block])
-        if (
-            not callable(self.coefficients) and np.shape(self.coefficients[0])[1] == n
-        ):  # everything else was checked at construction
+        if callable(self.coefficients):
+            return self._checked(self.coefficients(eom, t), n)
+        if np.shape(self.coefficients[0])[1] == n:  # everything else was checked at construction
             return cast("tuple[Array, Array]", self.coefficients)
-        return self._checked(
-            self.coefficients(eom, t) if callable(self.coefficients) else self.coefficients, n
-        )
+        return self._checked(self.coefficients, n)
 
     def labels(self, m: int) -> tuple[ConstraintLabel, ...]:
         """Return a label for each of m rows.
@@ -164,15 +162,11 @@ class LinearInequality(Value):
                 f"inequality {self.name!r} has {len(self.row_names)} row names but {m} rows. Give "
                 f"one name for each row."
             )
+        name = self.name
         if self.row_names:
-            return tuple(
-                ConstraintLabel(f"{self.name} {row_name}", self.name, row_name)
-                for row_name in self.row_names
-            )
-        return tuple(
-            ConstraintLabel(f"{self.name} {i}" if m > 1 else self.name, "inequality", self.name, i)
-            for i in range(m)
-        )
+            return tuple(ConstraintLabel(f"{name} {row}", name, row) for row in self.row_names)
+        texts = [f"{name} {i}" for i in range(m)] if m > 1 else [name] * m
+        return tuple(ConstraintLabel(text, "inequality", name, i) for i, text in enumerate(texts))
 
     def _checked(self, given: Any, n: int | None) -> tuple[Array, Array]:
         """Return G and h as arrays, checked; n: size of the block, None if it is unknown."""
@@ -183,14 +177,10 @@ class LinearInequality(Value):
             )
         G = as_array(f"G of {self.name}", given[0], (None, None))
         if n is not None and G.shape[1] != n:
-            follows = (
-                " Use a function of (eom, t) to follow the contacts."
-                if self.block == "forces"
-                else ""
-            )
+            advice = " Use a function of (eom, t) to follow the contacts."
             raise InputError(
                 f"G of inequality {self.name!r} has {G.shape[1]} columns, but its block "
-                f"{self.block!r} has {n} entries.{follows}"
+                f"{self.block!r} has {n} entries.{advice if self.block == 'forces' else ''}"
             )
         return G, as_array(f"h of {self.name}", given[1], (len(G),))
 
@@ -213,14 +203,13 @@ def _as_bounds(name: str, value: Any, optional: bool = False) -> NormalForces:
                 f'{{"FL_foot": lambda t: …}}.'
             )
         return as_positive(name, given, "N", allow_zero=True)
-    return MappingProxyType(
-        {
-            contact: as_callable(f"{name} at {contact}", bound, "force(t)")
-            if callable(bound)
-            else as_positive(f"{name} at {contact}", bound, "N", allow_zero=True)
-            for contact, bound in given.items()
-        }
-    )
+    bounds = dict(given)
+    for contact, bound in bounds.items():
+        if callable(bound):
+            as_callable(f"{name} at {contact}", bound, "force(t)")
+        else:
+            bounds[contact] = as_positive(f"{name} at {contact}", bound, "N", allow_zero=True)
+    return MappingProxyType(bounds)
 
 
 def _as_inequalities(name: str, value: Any) -> tuple[LinearInequality, ...]:
@@ -289,8 +278,10 @@ class Limits(Value):
         super().__post_init__()
         if self.joint_limits is not None and not isinstance(self.joint_limits, JointLimits):
             raise InputError(
-                f"joint_limits must be JointLimits or None, not {short_repr(self.joint_limits)}. "
-                f"floatbase.control.Limits.of(robot) has the joint limits of a robot."
+                f"joint_limits must be None or JointLimits, such as "
+                f"floatbase.control.JointLimits.of(robot, weight=1e4), not "
+                f"{short_repr(self.joint_limits)}. Controllers and "
+                f'floatbase.control.Limits.of(robot) also accept "robot".'
             )
 
     @classmethod
@@ -327,23 +318,11 @@ class Limits(Value):
             If an argument has a wrong type, shape or value.
         """
         as_instance("robot", robot, Robot, 'fb.load("go2")')
-        unknown = [name for name in options if name not in cls.__dataclass_fields__]
-        if unknown:
-            raise InputError(
-                f"Limits has no parameter {unknown[0]!r}. It has "
-                f"{', '.join(cls.__dataclass_fields__)}."
-            )
-        torques = as_torque_limits(
-            robot.d, robot.torque_limits if torque_limits is None else torque_limits
-        )
+        check_parameters(cls, options)
+        torque_limits = robot.torque_limits if torque_limits is None else torque_limits
+        torques = as_torque_limits(robot.d, torque_limits)
         if isinstance(joint_limits, str) and joint_limits == "robot":
             joint_limits = JointLimits.of(robot, torque_limits=torques)
-        elif joint_limits is not None and not isinstance(joint_limits, JointLimits):
-            raise InputError(
-                f'joint_limits must be "robot", None or JointLimits, such as '
-                f"floatbase.control.JointLimits.of(robot, weight=1e4), not "
-                f"{short_repr(joint_limits)}."
-            )
         return cls(torques, joint_limits=joint_limits, **options)
 
     def softened(self, weight: float) -> Limits:
@@ -362,16 +341,15 @@ class Limits(Value):
         Limits
             The limits; this object if nothing changes.
         """
-        joints, inequalities = self.joint_limits, self.inequalities
-        bounded = bool(self.min_normal_force) or self.max_normal_force != {}
+        joints, inequalities = self.joint_limits, list(self.inequalities)
         changes: dict[str, Any] = {}
+        bounded = bool(self.min_normal_force) or self.max_normal_force != {}
         if joints is not None and joints.weight is None:
             changes["joint_limits"] = replace(joints, weight=weight)
-        if any(each.weight is None for each in inequalities):
-            changes["inequalities"] = [
-                replace(each, weight=weight) if each.weight is None else each
-                for each in inequalities
-            ]
+        for i, each in enumerate(inequalities):
+            if each.weight is None:
+                inequalities[i] = replace(each, weight=weight)
+                changes["inequalities"] = inequalities
         if bounded and self.normal_force_weight is None:
             changes["normal_force_weight"] = weight
         return replace(self, **changes) if changes else self
@@ -384,17 +362,13 @@ class Limits(Value):
     @cached_property
     def time_varying(self) -> bool:
         """Whether a bound of a normal force is a function of time."""
-        return any(
-            callable(value) for bound in self._bounds_by_name.values() for value in bound.values()
-        )
+        bounds = self._bounds_by_name.values()
+        return any(callable(value) for bound in bounds for value in bound.values())
 
     @property
     def _bounds_by_name(self) -> dict[str, Mapping[str, Any]]:
         """Bounds of normal forces that are mappings, by the name of the argument."""
-        both = {
-            "min_normal_force": self.min_normal_force,
-            "max_normal_force": self.max_normal_force,
-        }
+        both = {name: getattr(self, name) for name in ("min_normal_force", "max_normal_force")}
         return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
 
     def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
@@ -412,11 +386,7 @@ class Limits(Value):
         UnknownNameError
             If a name is neither known nor in the limits before.
         """
-        names = {
-            name
-            for some in (*known, *(before._bounds_by_name.values() if before else ()))
-            for name in some
-        }
+        names = set().union(*known, *(before._bounds_by_name.values() if before else ()))
         for argument, bound in self._bounds_by_name.items():
             for name in bound:
                 if name not in names:
@@ -485,10 +455,9 @@ class Limits(Value):
         tuple of LinearInequality
             The inequalities.
         """
-        bounds = None
-        if self.normal_force_weight is not None:
-            bounds = _soft_force_bounds(contacts, self)
-        return tuple(self.inequalities) if bounds is None else (*self.inequalities, bounds)
+        is_soft = self.normal_force_weight is not None
+        bounds = _soft_force_bounds(contacts, self) if is_soft else None
+        return (*self.inequalities, *([bounds] if bounds else []))
 
     def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
         """Return minimum and maximum normal force of each contact point at time t."""
@@ -514,11 +483,11 @@ class Limits(Value):
         assert largest is not None  # __post_init__ replaces None
         bounded = [
             (
-                _bound_of(least, each.name, 0.0) != 0.0,
-                _bound_of(largest, each.name, None) is not None,
+                _bound_of(least, foot.name, 0.0) != 0.0,
+                _bound_of(largest, foot.name, None) is not None,
             )
-            for each in contacts.friction_contacts
-            for _ in each.point_names
+            for foot in contacts.friction_contacts
+            for _ in foot.point_names
         ]
         return np.array(bounded, dtype=np.bool_).reshape(-1, 2).T
 
@@ -585,23 +554,15 @@ def force_rows(contacts: Contacts, limits: Limits) -> tuple[Array, tuple[Constra
     G = np.zeros((per_point * contacts.n_points, contacts.k))
     for i, point in enumerate(contacts.point_names):
         cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], *limits.polyhedron_options)
-        G[per_point * i : per_point * (i + 1), contacts.point_force_indices[3 * i : 3 * i + 3]] = (
-            np.vstack([cone.face_matrix, -cone.normal])
-        )
-        names += [
-            ConstraintLabel(f"{point} facet {facet}", "friction", point, facet)
-            for facet in range(limits.facets)
-        ]
+        rows, columns = slice(per_point * i, per_point * (i + 1)), slice(3 * i, 3 * i + 3)
+        G[rows, contacts.point_force_indices[columns]] = np.vstack([cone.face_matrix, -cone.normal])
+        for facet in range(limits.facets):
+            names.append(ConstraintLabel(f"{point} facet {facet}", "friction", point, facet))
         names.append(ConstraintLabel(f"{point} normal force", "normal force", point))
     bounded = np.flatnonzero(hard_maximum(contacts, limits))
-    names += [
-        ConstraintLabel(
-            f"{contacts.point_names[i]} largest normal force",
-            "largest normal force",
-            contacts.point_names[i],
-        )
-        for i in bounded
-    ]
+    for point in (contacts.point_names[i] for i in bounded):
+        kind = "largest normal force"
+        names.append(ConstraintLabel(f"{point} {kind}", kind, point))
     return read_only(np.vstack([G, -G[limits.facets :: per_point][bounded]])), tuple(names)
 
 

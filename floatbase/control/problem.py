@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import islice
 from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
@@ -140,11 +141,8 @@ class Problem(Value):
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:
         """Tasks of each priority level; empty if the tasks are weighted."""
-        ends = np.cumsum(self.level_sizes)
-        return tuple(
-            tuple(self.tasks[end - size : end])
-            for end, size in zip(ends, self.level_sizes, strict=True)
-        )
+        tasks = iter(self.tasks)
+        return tuple(tuple(islice(tasks, size)) for size in self.level_sizes)
 
     def qp(self, state: State, t: float = 0.0) -> QP:
         """Return the QP at a state and a time.
@@ -341,9 +339,7 @@ def assemble_qp(
         H[block, block] += weight * residual.A.T @ residual.A
         g[block] += weight * residual.A.T @ residual.b
     motion, b = _resolved_motion_rows(eom)
-    A = np.vstack(
-        [np.hstack([eom.M, -eom.S, -eom.J.T]), np.hstack([motion, np.zeros((len(motion), d + k))])]
-    )
+    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
     G_force, names = force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
     blocks_of_G: list[tuple[Block, Array, Array]] = [
@@ -368,20 +364,10 @@ def assemble_qp(
     for each, G_part, _ in blocks_of_G:
         G[row : row + len(G_part), blocks[each]] = G_part
         row += len(G_part)
-    return QP(
-        H,
-        g,
-        A,
-        np.concatenate([-eom.h, b]),
-        G,
-        h,
-        _equality_names(eom.robot, eom.contacts),
-        names,
-        blocks,
-        None
-        if not any(weights)
-        else np.array([np.inf if weight is None else weight for weight in weights]),
-    )
+    penalties = np.array([np.inf if weight is None else weight for weight in weights])
+    b, equality_names = np.concatenate([-eom.h, b]), _equality_names(eom.robot, eom.contacts)
+    soft = penalties if any(weights) else None
+    return QP(H, g, A, b, G, h, equality_names, names, blocks, soft)
 
 
 @contextmanager
@@ -437,14 +423,9 @@ def _with_regularisation(robot: Robot, tasks: Sequence[Task]) -> tuple[tuple[Tas
                 f'"forces".'
             )
         as_positive(f"weight of {task.name}", task.weight, allow_zero=True)
-    missing = [
-        kind(weight=effort_weight(robot))
-        for kind in (ForceTask, TorqueTask)
-        if not any(
-            task.block == kind.block and not isinstance(task, CentreOfPressureTask)
-            for task in tasks
-        )
-    ]
+    blocks = {task.block for task in tasks if not isinstance(task, CentreOfPressureTask)}
+    kinds = [kind for kind in (ForceTask, TorqueTask) if kind.block not in blocks]
+    missing = [kind(weight=effort_weight(robot)) for kind in kinds]
     return tuple(tasks + cast("list[Task]", missing)), sizes
 
 
@@ -453,9 +434,9 @@ def residual_of(task: Task, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
     try:
         residual = task.residual(eom, t)
     except InputError as error:  # such as an `Affine` with NaN: name the task
-        raise (
-            error if f"of {task.name}" in str(error) else InputError(f"task {task.name!r}: {error}")
-        ) from None
+        if f"of {task.name}" in str(error):
+            raise
+        raise InputError(f"task {task.name!r}: {error}") from None
     except TypeError:
         as_callable(f"the residual of {task.name!r}", task.residual, "residual(eom, t)")
         raise
@@ -483,10 +464,8 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     gap = np.abs(eom.b - b)
     velocity = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
     if np.max(gap, initial=0.0) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * velocity:
-        names = [
-            _equality_names(eom.robot, eom.contacts)[eom.nv + i]
-            for i in np.flatnonzero(gap > 0.1 * gap.max())
-        ]
+        rows = _equality_names(eom.robot, eom.contacts)[eom.nv :]
+        names = [rows[i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(
             f"These motion constraints are inconsistent: {', '.join(names)}. Remove at least one "
             f"of them.",
@@ -498,18 +477,10 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
 @lru_cache(maxsize=64)
 def _equality_names(robot: Robot, contacts: Contacts) -> tuple[ConstraintLabel, ...]:
     """Return the names of the rows of (7)."""
-    axes = (
-        [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
-        if robot.is_floating
-        else []
-    )
-    dynamics = [
-        ConstraintLabel(f"dynamics {owner}", "dynamics", owner)
-        for owner in (*axes, *robot.joint_names)
-    ]
-    motion = [
-        (contact.name, i, row) for contact in contacts for i, row in enumerate(contact.row_names)
-    ]
-    return *dynamics, *(
-        ConstraintLabel(f"motion {name} {row}", "motion", name, i) for name, i, row in motion
-    )
+    base = [f"base {part} {axis}" for part in ("linear", "angular") for axis in "xyz"]
+    owners = [*(base if robot.is_floating else []), *robot.joint_names]
+    labels = [ConstraintLabel(f"dynamics {owner}", "dynamics", owner) for owner in owners]
+    for name, rows in ((contact.name, contact.row_names) for contact in contacts):
+        for i, row in enumerate(rows):
+            labels.append(ConstraintLabel(f"motion {name} {row}", "motion", name, i))
+    return tuple(labels)

@@ -89,12 +89,7 @@ def with_soft_contacts(
     contacts: Contacts, tasks: Sequence[Task], weight: float
 ) -> tuple[Contacts, tuple[Task, ...]]:
     """Return soft contacts and tasks from contacts and tasks that may be soft or rigid."""
-    rigid = Contacts(
-        [
-            contact.contact if isinstance(contact, SoftConstraint) else contact
-            for contact in contacts
-        ]
-    )
+    rigid = Contacts([c.contact if isinstance(c, SoftConstraint) else c for c in contacts])
     other_tasks = [task for task in tasks if not isinstance(task, ContactMotionTask)]
     motion_task = ContactMotionTask(rigid, as_positive("contact_weight", weight))
     soft = [SoftContact(c) if isinstance(c, FrictionContact) else SoftConstraint(c) for c in rigid]

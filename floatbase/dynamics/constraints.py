@@ -149,7 +149,7 @@ class RollingWheel(SinglePointContact):
     Parameters
     ----------
     frame : str
-        Name of the wheel's frame. Its origin is the centre of the wheel.
+        Name of the wheel's frame.
     axis : array_like, shape (3,)
         Direction of the axle in the wheel's frame, dimensionless; it is scaled to unit length.
     radius : float
@@ -159,6 +159,8 @@ class RollingWheel(SinglePointContact):
         length.
     mu : float, optional
         Coefficient of friction, dimensionless.
+    centre : array_like, shape (3,), optional
+        Centre of the wheel in the frame [m].
 
     Raises
     ------
@@ -175,6 +177,9 @@ class RollingWheel(SinglePointContact):
     radius: float = field(metadata=checked(as_positive, "m"))
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
     mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
+    centre: Array = field(
+        default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
+    )
     jacobian_is_constraint: ClassVar[bool] = True
 
     def slip(self, state: State) -> Array:
@@ -193,9 +198,10 @@ class RollingWheel(SinglePointContact):
         return self.jacobian(state) @ state.v
 
     def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return -r u and its derivative; u is the unit vector along n - (n · axle) axle."""
-        n, axle = self.normal, state.frame_pose(self.frame).rotation @ self.axis
-        axle_rate = cross(state.frame_velocity(self.frame)[3:], axle)
+        """Return R c - r u and its derivative; u is the unit vector along n - (n · axle) axle."""
+        R, omega = state.frame_pose(self.frame).rotation, state.frame_velocity(self.frame)[3:]
+        n, axle, to_centre = self.normal, R @ self.axis, R @ self.centre
+        axle_rate = cross(omega, axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
         if length < _MIN_TILT:
@@ -204,7 +210,8 @@ class RollingWheel(SinglePointContact):
                 f"to roll on. Tilt the wheel, or use another contact for it."
             )
         u, w_rate = w / length, -(n @ axle_rate) * axle - (n @ axle) * axle_rate
-        return -self.radius * u, -self.radius / length * (w_rate - u * (u @ w_rate))
+        u_rate = (w_rate - u * (u @ w_rate)) / length
+        return to_centre - self.radius * u, cross(omega, to_centre) - self.radius * u_rate
 
 
 def fixed_frame(frame: str) -> LinearConstraint:

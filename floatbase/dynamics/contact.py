@@ -158,6 +158,22 @@ class SinglePointContact(Value):
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
         return self._jacobian(state, arm), read_only(b)
 
+    def rolling_velocity(self, state: State) -> Array:
+        """Compute how fast the contact point moves along the body, as a ball or a wheel rolls.
+
+        Parameters
+        ----------
+        state : State
+            State of the robot.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Velocity of the contact point minus that of the body there, in the world frame [m/s].
+        """
+        arm, arm_rate = self._arm(state)
+        return arm_rate - cross(state.frame_velocity(self.frame)[3:], arm)
+
     def _jacobian(self, state: State, arm: Array) -> Array:
         """Compute the Jacobian of the body point at `arm` from the frame's origin."""
         J = state.frame_jacobian(self.frame)
@@ -237,14 +253,8 @@ class FlatFootContact(Value):
     corners: Array
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
     mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
-    row_names: ClassVar[tuple[str, ...]] = (
-        "x",
-        "y",
-        "z",
-        "angular x",
-        "angular y",
-        "angular z",
-    )  # world-aligned
+    # world-aligned
+    row_names: ClassVar[tuple[str, ...]] = "x", "y", "z", "angular x", "angular y", "angular z"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,6 +21,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
+from floatbase.dynamics.constraints import RollingWheel
 from floatbase.dynamics.contact import (
     DEFAULT_MU,
     UP,
@@ -104,7 +105,8 @@ class Contacts(Value):
     ) -> Contacts:
         """Make point contacts at the robot's feet or at other frames.
 
-        A flat foot touches the ground at the middle of its corners; `flat_feet` uses its area.
+        A flat foot touches the ground at the middle of its corners; `flat_feet` uses its area. A
+        wheel touches it at its lowest point, as a `floatbase.dynamics.RollingWheel`.
 
         Parameters
         ----------
@@ -122,7 +124,7 @@ class Contacts(Value):
         Returns
         -------
         Contacts
-            One point contact for each frame.
+            One contact for each frame, with one point.
 
         Raises
         ------
@@ -131,12 +133,8 @@ class Contacts(Value):
         UnknownNameError
             If `frames`, `mu` or `normals` has a name that does not exist.
         """
-        return Contacts(
-            [
-                _make_contact(*foot_data, flat=False)
-                for foot_data in _selected_feet(robot, frames, mu, normals)
-            ]
-        )
+        feet = _selected_feet(robot, frames, mu, normals)
+        return Contacts([_make_contact(*foot_data, flat=False) for foot_data in feet])
 
     @staticmethod
     def flat_feet(
@@ -180,7 +178,7 @@ class Contacts(Value):
 
     @staticmethod
     def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
-        """Make contacts of all feet: flat feet with their corners, other feet as points.
+        """Make contacts of all feet: flat feet with their corners, wheels that roll, and points.
 
         Parameters
         ----------
@@ -209,9 +207,8 @@ class Contacts(Value):
                 f'fb.load_urdf(path, feet=["…"]), or name the frames in contact, '
                 f'fb.Contacts.points(robot, frames=["…"]). For free flight, use fb.Contacts.none().'
             )
-        return Contacts(
-            [_make_contact(*foot_data) for foot_data in _selected_feet(robot, None, mu, normals)]
-        )
+        feet = _selected_feet(robot, None, mu, normals)
+        return Contacts([_make_contact(*foot_data) for foot_data in feet])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -295,11 +292,7 @@ class Contacts(Value):
         ndarray, shape (k, nv)
             Jacobian of the contact points in world axes; Jᵀ λ is the generalized contact force.
         """
-        as_instance("state", state, State)
-        t = as_number("t", t, "s")
-        return self._stacked(
-            state, [read_only(contact.jacobian(state, t)) for contact in self.items]
-        )
+        return self._jacobian_and_constraint(state, t)[0]
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """Compute the stacked rows A q̈ = b that the contacts impose on the motion.
@@ -322,30 +315,19 @@ class Contacts(Value):
         -----
         [FBR]_, eq. (5).
         """
-        as_instance("state", state, State)
-        t = as_number("t", t, "s")
-        parts = [tuple(map(read_only, contact.constraint(state, t))) for contact in self.items]
-        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-        return self._stacked(state, [part[0] for part in parts]), read_only(b)
+        return self._jacobian_and_constraint(state, t)[1:]
 
     def _jacobian_and_constraint(self, state: State, t: float) -> tuple[Array, Array, Array]:
         """Compute J, A and b, evaluating each contact once where J equals A."""
         as_instance("state", state, State)
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
-        A = self._stacked(state, [part[0] for part in parts])
-        b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-        return (
-            A
-            if all(J is A for A, _, J in parts)
-            else self._stacked(state, [part[2] for part in parts]),
-            A,
-            read_only(b),
-        )
-
-    def _stacked(self, state: State, rows: Sequence[Array]) -> Array:
-        """Stack rows of length nv; without contacts there are none."""
-        return read_only(np.vstack([np.zeros((0, state.robot.nv)), *rows]))
+        none = np.zeros((0, state.robot.nv))
+        A = read_only(np.vstack([none, *(A for A, _, _ in parts)]))
+        b = read_only(np.concatenate([np.zeros(0), *(b for _, b, _ in parts)]))
+        if all(J is A for A, _, J in parts):
+            return A, A, b
+        return read_only(np.vstack([none, *(J for _, _, J in parts)])), A, b
 
     def force_slice(self, name: str) -> slice:
         """Return the slice of λ that belongs to one contact.
@@ -461,14 +443,9 @@ class Contacts(Value):
         return self.items[self.names.index(name)]
 
     def __add__(self, other: Contacts) -> Contacts:
-        return Contacts(
-            [
-                *self.items,
-                *as_instance(
-                    "the right-hand side of Contacts + …", other, Contacts, "fb.Contacts([contact])"
-                ).items,
-            ]
-        )
+        example = "fb.Contacts([contact])"
+        as_instance("the right-hand side of Contacts + …", other, Contacts, example)
+        return Contacts([*self.items, *other.items])
 
     def __iter__(self) -> Iterator[MotionConstraint]:
         return iter(self.items)
@@ -523,7 +500,9 @@ def constraint_and_jacobian(
 
 
 def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
-    """Make the contact of a foot: a point if it has no corners or `flat` is False."""
+    """Make the contact of a foot: a wheel, a sole if `flat` is True, or else a point."""
+    if foot.axis is not None:
+        return RollingWheel(foot.frame, foot.axis, foot.radius, normal, mu, foot.centre)
     if flat and foot.is_flat:
         return FlatFootContact(foot.frame, foot.points, normal, mu)
     return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
@@ -534,11 +513,9 @@ def _selected_feet(
 ) -> list[tuple[Foot, float, Array]]:
     """Return the feet in contact, each with its coefficient of friction and its normal."""
     as_instance("robot", robot, Robot)
-    feet = (
-        robot.feet
-        if frames is None
-        else tuple(robot.foot(frame) for frame in as_strings("frames", frames))
-    )
+    feet = robot.feet
+    if frames is not None:
+        feet = tuple(robot.foot(frame) for frame in as_strings("frames", frames))
     if not feet:
         raise InputError(
             f'{robot.name} has no feet. Name the frames in contact, frames=["…"]; robot.frames '
@@ -546,14 +523,8 @@ def _selected_feet(
         )
     names = [foot.frame for foot in feet]
     normals = UP if normals is None else normals
-    return list(
-        zip(
-            feet,
-            _per_name("mu", mu, names, DEFAULT_MU),
-            _per_name("normals", normals, names, UP, (3,)),
-            strict=True,
-        )
-    )
+    mus = _per_name("mu", mu, names, DEFAULT_MU)
+    return list(zip(feet, mus, _per_name("normals", normals, names, UP, (3,)), strict=True))
 
 
 def _per_name(
@@ -570,10 +541,8 @@ def _per_name(
             f"frames=[…]."
         )
     numeric = numeric_copy(value)
-    if (
-        not isinstance(value, Sequence | np.ndarray)
-        if numeric is None
-        else numeric.ndim == len(shape)
-    ):
+    is_list = isinstance(value, Sequence | np.ndarray)
+    is_one = not is_list if numeric is None else numeric.ndim == len(shape)
+    if is_one:
         return [value] * len(names)
     return list(as_array(argument, value, (len(names), *shape)))

@@ -47,9 +47,9 @@ def cone_face_matrix(rays: Array) -> tuple[Array, Array]:
     span, E = _span(rays)
     coordinates = span.T @ rays
     c, on_lines = _supporting_direction(coordinates)
-    transverse = (
-        _span(coordinates[:, on_lines])[1] if np.any(on_lines) else np.eye(len(coordinates))
-    )
+    transverse: Array = np.eye(len(coordinates))
+    if np.any(on_lines):
+        transverse = _span(coordinates[:, on_lines])[1]
     G = _pointed_face_matrix(transverse @ coordinates[:, ~on_lines], transverse @ c)
     return G @ transverse @ span.T, E
 
@@ -75,9 +75,8 @@ def polytope_vertices(support_point: Callable[[Array], Array], n: int, size: flo
         hull = _hull(flat)
         _, first = np.unique(np.round(hull.equations, _DIGITS), axis=0, return_index=True)
         normals, offsets = hull.equations[first, :-1], hull.equations[first, -1]
-        candidates = np.array(
-            [(support_point(basis @ normal) - origin) @ basis for normal in normals]
-        )
+        farthest = [support_point(basis @ normal) for normal in normals]
+        candidates = np.array([(point - origin) @ basis for point in farthest])
         beyond = np.einsum("ij,ij->i", normals, candidates) + offsets > tolerance
         if not np.any(beyond):
             return origin + flat[_hull_vertices(hull, flat, normals, offsets, tolerance)] @ basis.T
@@ -124,9 +123,8 @@ def _pointed_face_matrix(rays: Array, c: Array) -> Array:
         facet_rays = {frozenset([int(np.argmin(section))]), frozenset([int(np.argmax(section))])}
     else:  # all points on each facet of their convex hull
         equations = _hull(section).equations
-        on_facet = np.abs(
-            section @ equations[:, :-1].T + equations[:, -1]
-        ) < _QHULL_TOLERANCE * float(np.max(np.abs(section)))
+        tolerance = _QHULL_TOLERANCE * float(np.max(np.abs(section)))
+        on_facet = np.abs(section @ equations[:, :-1].T + equations[:, -1]) < tolerance
         facet_rays = {frozenset(np.flatnonzero(column).tolist()) for column in on_facet.T}
     rows = [_facet_through(rays, sorted(chosen)) for chosen in sorted(facet_rays, key=sorted)]
     return np.array([row for row in rows if row is not None])
@@ -156,11 +154,8 @@ def _affine_hull(
     flat = np.zeros((n, 0))
     points = []
     while basis.shape[1] + flat.shape[1] < n:
-        direction = (
-            np.linalg.svd(np.hstack([basis, flat]))[0][:, -1]
-            if basis.size + flat.size
-            else np.eye(n)[0]
-        )
+        known = np.hstack([basis, flat])
+        direction = np.linalg.svd(known)[0][:, -1] if known.size else np.eye(n)[0]
         ends = [support_point(direction), support_point(-direction)]
         points += ends
         step = ends[0] - ends[1]
@@ -193,11 +188,10 @@ def _hull_vertices(
     indices: list[int] = []
     for i in hull.vertices:
         facet_normals = normals[np.abs(normals @ points[i] + offsets) <= tolerance]
-        rank = (
-            int(np.sum(np.linalg.svd(facet_normals, compute_uv=False) > _SAME_DIRECTION))
-            if len(facet_normals)
-            else 0
+        sizes = (
+            np.linalg.svd(facet_normals, compute_uv=False) if len(facet_normals) else np.zeros(0)
         )
+        rank = int(np.sum(sizes > _SAME_DIRECTION))
         duplicate = any(np.linalg.norm(points[i] - points[j]) <= tolerance for j in indices)
         if rank == points.shape[1] and not duplicate:
             indices.append(int(i))

@@ -154,12 +154,8 @@ class WrenchSet(Value):
         """
         w = as_array("wrench", wrench, (6,))
         scale = float(np.linalg.norm(self._wrench_scaling @ w)) or self.weight
-        G = np.hstack(
-            [
-                self._wrench_scaling @ grasp_matrix(self.points, self.reference_point),
-                np.zeros((6, 1)),
-            ]
-        )
+        grasp = self._wrench_scaling @ grasp_matrix(self.points, self.reference_point)
+        G = np.hstack([grasp, np.zeros((6, 1))])
         rows, h = self._force_inequalities
         cost = np.append(np.zeros(3 * len(self.points)), -1.0)
         result = linear_program(
@@ -216,15 +212,13 @@ class WrenchSet(Value):
             raise InputError("direction is the zero wrench, but it must be non-zero.")
         w = as_array("start", np.zeros(6) if start is None else start, (6,))
         N, scale = self.rays.shape[1], float(np.linalg.norm(self._wrench_scaling @ d))
-        result = linear_program(
-            np.append(np.zeros(N), -1.0),
-            (
-                self._wrench_scaling @ np.column_stack([self.rays, -d / scale]),
-                self._wrench_scaling @ w,
-            ),
-            self._limit_inequalities(1),
-            [(0.0, None)] * N + [(None, None)],
+        A, b = (
+            self._wrench_scaling @ np.column_stack([self.rays, -d / scale]),
+            self._wrench_scaling @ w,
         )
+        bounds = [(0.0, None)] * N + [(None, None)]
+        cost = np.append(np.zeros(N), -1.0)
+        result = linear_program(cost, (A, b), self._limit_inequalities(1), bounds)
         if result.status == INFEASIBLE:
             raise InfeasibleError("The contacts cannot produce start + s · direction for any s.")
         return np.inf if result.status == UNBOUNDED else -float(result.fun) / scale
@@ -255,9 +249,8 @@ class WrenchSet(Value):
         InfeasibleError
             If the contacts cannot carry the weight without a moment.
         """
-        angles = (
-            2.0 * np.pi * np.arange(as_integer("number of directions n", n, 1, _MAX_DIRECTIONS)) / n
-        )
+        n = as_integer("number of directions n", n, 1, _MAX_DIRECTIONS)
+        angles = 2.0 * np.pi * np.arange(n) / n
         weight_wrench = np.array([0.0, 0.0, self.weight, 0.0, 0.0, 0.0])
         if not self.contains(weight_wrench):
             raise InfeasibleError(
@@ -292,12 +285,8 @@ class WrenchSet(Value):
         of [BretlLall2008]_.
         """
         origin = self.points.mean(axis=0)
-        rays = np.vstack(
-            [
-                self.rays[:3],
-                self.rays[3:] + np.cross(self.reference_point - origin, self.rays[:3].T).T,
-            ]
-        )
+        moments = self.rays[3:] + np.cross(self.reference_point - origin, self.rays[:3].T).T
+        rays = np.vstack([self.rays[:3], moments])
         # the moment about the origin must be (c - origin) × (0, 0, weight), which is
         # (weight c_y, -weight c_x, 0)
         places = np.array([-rays[4], rays[3]]) / self.weight
@@ -336,14 +325,11 @@ class WrenchSet(Value):
     def _force_inequalities(self) -> tuple[Array, Array]:
         """Facets and limits of all points as inequalities on (λ, t): every slack is at least t."""
         rows, h = [], []
-        for at, cone, limit in zip(
-            np.eye(len(self.points)), self.cones, self.max_normal_force, strict=True
-        ):
-            face_matrix = (
-                np.vstack([cone.face_matrix, cone.normal])
-                if np.isfinite(limit)
-                else cone.face_matrix
-            )
+        points = np.eye(len(self.points))
+        for at, cone, limit in zip(points, self.cones, self.max_normal_force, strict=True):
+            face_matrix = cone.face_matrix
+            if np.isfinite(limit):
+                face_matrix = np.vstack([face_matrix, cone.normal])
             rows.append(np.hstack([np.kron(at, face_matrix), np.ones((len(face_matrix), 1))]))
             h.append(np.append(np.zeros(cone.facets), limit)[: len(face_matrix)])
         return np.vstack(rows), np.concatenate(h)
@@ -359,12 +345,10 @@ class WrenchSet(Value):
         limited = np.isfinite(self.max_normal_force)
         if not np.any(limited):
             return None
-        rows = np.repeat(np.eye(len(self.points)), [cone.facets for cone in self.cones], axis=1)[
-            limited
-        ]
-        return np.hstack([rows, np.zeros((len(rows), extra_columns))]), self.max_normal_force[
-            limited
-        ] / scale
+        facets = [cone.facets for cone in self.cones]
+        rows = np.repeat(np.eye(len(self.points))[limited], facets, axis=1)
+        none = np.zeros((len(rows), extra_columns))
+        return np.hstack([rows, none]), self.max_normal_force[limited] / scale
 
     @cached_property
     def _halfspaces(self) -> tuple[Array, Array]:
@@ -435,11 +419,9 @@ def wrench_set(
             f"These contacts have no friction cone: {', '.join(without_cone)}. Leave them out with "
             f"contacts.without(…)."
         )
-    point_data = zip(contacts.normals, contacts.mus, strict=True)
-    cones = tuple(
-        FrictionPolyhedron(n, mu, facets, inner_approximation, facet_rotation)
-        for n, mu in point_data
-    )
+    options = facets, inner_approximation, facet_rotation
+    points = zip(contacts.normals, contacts.mus, strict=True)
+    cones = tuple(FrictionPolyhedron(n, mu, *options) for n, mu in points)
     limits: Any = np.inf if max_normal_force is None else max_normal_force
     numeric = numeric_copy(limits)
     limits = np.repeat(numeric, len(cones)) if numeric is not None and numeric.ndim == 0 else limits

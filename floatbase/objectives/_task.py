@@ -140,9 +140,8 @@ class TargetTask(Value):
                     f"{label} cannot be a function. Make {first} a function that returns "
                     f"{self._all_hint}."
                 )
-            elif (
-                target is not None or getattr(type(self), name, ...) is not None
-            ):  # None is valid only as the default
+            elif target is not None or getattr(type(self), name, ...) is not None:
+                # None is valid only as the default
                 array = self._as_target(label, target, shape)
                 fields[name] = array if name != first else self._checked(array, None)
                 if time_varying and np.any(array):

@@ -65,9 +65,8 @@ def minimum_norm_coordinates(space: FeasibleSpace, block: Block) -> Affine:
     """
     as_instance("space", space, FeasibleSpace)
     f = space.map[block]
-    U, s, Vt, r = svd_with_rank(
-        f.A, absolute=True
-    )  # part of orthonormal columns: singular values below the tolerance are rounding
+    # part of orthonormal columns: singular values below the tolerance are rounding
+    U, s, Vt, r = svd_with_rank(f.A, absolute=True)
     V_pinv = (Vt[:r].T / s[:r]) @ U[:, :r].T
     return Affine(V_pinv, -V_pinv @ f.b)
 

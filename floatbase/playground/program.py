@@ -186,6 +186,6 @@ def _load_call(robot: Robot) -> str:
     given = [repr(f"{robot.name}.urdf"), *([] if robot.is_floating else ["floating=False"])]
     if robot.feet:
         given.append(f"feet={[foot.frame for foot in robot.feet]}")
-        if not robot.feet[0].is_flat:  # soles are found in the URDF
+        if not robot.feet[0].is_flat and robot.feet[0].axis is None:  # others are found in the URDF
             given.append(f"foot_radius={robot.feet[0].radius!r}")
     return f"fb.load_urdf({', '.join(given)})"

@@ -27,10 +27,8 @@ def linear_program(
     from scipy.optimize import linprog  # slow to import, and rarely needed
 
     (A, b), (G, h) = equalities or (None, None), inequalities or (None, None)
-    for presolve in (
-        True,
-        False,
-    ):  # presolve may stop at "infeasible or unbounded"; without it, the simplex method decides
+    # presolve may stop at "infeasible or unbounded"; without it, the simplex method decides
+    for presolve in (True, False):
         result = linprog(
             cost, G, h, A, b, bounds, method="highs-ds", options={"presolve": presolve}
         )

@@ -202,9 +202,8 @@ def active_set(
         if phase_one.converged
         else replace(phase_one, iterations=[])
     )
-    if result.converged and np.any(
-        _violated(problem, result.x)
-    ):  # rows so nearly parallel that the method treats them as one
+    if result.converged and np.any(_violated(problem, result.x)):
+        # rows so nearly parallel that the method treats them as one
         raise SolverError(
             f"The result of active_set violates nearly equal rows of {qp!r}. Check their scaling."
         )
@@ -303,9 +302,8 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
         relaxed, np.append(y, violation[worst]), [*rows, worst], max_iterations, last=s_row
     )
     if result.converged and result.rows[-1] != s_row and np.any(_violated(problem, result.x[:-1])):
-        share = (
-            result.multipliers * relaxed.row_norms[result.rows]
-        )  # the shares of the violated rows add up to 1
+        # the shares of the violated rows add up to 1
+        share = result.multipliers * relaxed.row_norms[result.rows]
         raise infeasible(
             problem.inequality_names[i]
             for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE])

@@ -240,12 +240,10 @@ class QP(Value):
         U, s, Vt, rank = svd_with_rank(A)
         residual = np.max(np.abs(U[:, rank:].T @ b), initial=0.0)
         if residual > _CONSISTENCY_TOLERANCE * (1.0 + np.max(np.abs(b), initial=0.0)):
-            resolved = (U[:, :rank] * s[:rank]) @ Vt[
-                :rank
-            ]  # solutions of nearly equal rows would lie far away
-            sides = conflicting_constraints(
-                np.vstack([resolved, -resolved]), np.append(b, -b)
-            )  # A x ≤ b and A x ≥ b
+            # solutions of nearly equal rows would lie far away
+            resolved = (U[:, :rank] * s[:rank]) @ Vt[:rank]
+            # A x ≤ b and A x ≥ b
+            sides = conflicting_constraints(np.vstack([resolved, -resolved]), np.append(b, -b))
             rows = [self.equality_names[i] for i in sorted(side % len(A) for side in sides)]
             raise InfeasibleError(
                 f"These equality constraints are inconsistent: {', '.join(rows)}. Remove one of "

@@ -273,9 +273,8 @@ def _cvxpy(qp: QP) -> Solution | None:
     # the variables are relative to the optimum without inequalities: Clarabel's gap is relative to
     # the objective, which is then small, so weights of 1e-6 still matter beside weights of 10
     origin = qp.equality_space(np.linalg.lstsq(reduced.H, -reduced.g, rcond=None)[0])
-    scale = min(
-        _objective_scale(qp), 1.0
-    )  # a small objective is enlarged, or Clarabel's absolute tolerance would hide it
+    # a small objective is enlarged, or Clarabel's absolute tolerance would hide it
+    scale = min(_objective_scale(qp), 1.0)
     H, slope = qp.H / scale, (qp.H @ origin + qp.g) / scale
     step = cp.Variable(qp.n)
     equalities = [qp.A @ step == qp.b - qp.A @ origin] if len(qp.A) else []

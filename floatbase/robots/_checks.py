@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array, as_array, numeric_copy, read_only, short_repr
-from floatbase.errors import InputError, unknown_name
+from floatbase.errors import InputError, UnknownNameError
 
 # accepts quaternions printed with seven digits; normalizing a larger error could hide a fault
 UNIT_NORM_TOLERANCE = 1e-6
@@ -48,16 +48,10 @@ def clamp_to_limits(model: pin.Model, q: Array) -> Array:
     excess = q[index] - nearest
     # the least number of turns
     unwrapped = q[index] - 2.0 * np.pi * np.sign(excess) * np.ceil(np.abs(excess) / (2.0 * np.pi))
-    is_revolute = np.array(
-        [model.joints[joint].shortname().startswith("JointModelR") for joint in joints.tolist()],
-        dtype=bool,
-    )
-    use_unwrapped = (
-        is_revolute
-        & (np.abs(excess) > _LIMIT_TOLERANCE)
-        & (lower <= unwrapped)
-        & (unwrapped <= upper)
-    )
+    types = [model.joints[joint].shortname() for joint in joints.tolist()]
+    use_unwrapped = np.char.startswith(np.array(types, dtype=str), "JointModelR")
+    use_unwrapped &= np.abs(excess) > _LIMIT_TOLERANCE
+    use_unwrapped &= (lower <= unwrapped) & (unwrapped <= upper)
     clamped[index] = np.where(use_unwrapped, unwrapped, nearest)
     return read_only(clamped)
 
@@ -98,8 +92,9 @@ def with_angles(
     for pattern, angle in angles.items():
         matching = [j for j in joints if j == pattern or fnmatchcase(j, str(pattern))]
         if not matching:
-            raise unknown_name(
-                f"joint of {name}", pattern, joints, "A * stands for any characters."
+            raise UnknownNameError(
+                f"No joint of {name} has the name {short_repr(pattern)}. A * stands for any "
+                f"characters. The joints are {', '.join(joints) or 'all fixed'}."
             )
         x = float(as_array(f"posture[{pattern!r}]", angle, (), "rad or m"))
         for joint in map(model.getJointId, matching):

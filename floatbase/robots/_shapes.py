@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import RobotWarning
+from floatbase.robots.inertia import text_of
 
 _PRISM_SIDES = 24  # sides of the prism that approximates a cylinder to 1 % of its radius
 _N_DIRECTIONS = 1000  # points on a sphere: a ball of 10 cm flattens by 0.2 mm
@@ -64,7 +65,17 @@ def missing_meshes(urdf: str, folders: Sequence[Path]) -> list[str]:
     return sorted(name for name in names if _find_mesh(name, folders) is None)
 
 
-def shape_points(shape: Any) -> Array:
+def placed_points(shape: Any, joint: pin.SE3 | None = None) -> Array:
+    """Return points whose hull is a shape, shape (n, 3) [m]; none if its kind is unknown.
+
+    They are in the frame of the shape's joint, or in the one in which the joint has a placement.
+    """
+    place = shape.placement if joint is None else joint * shape.placement
+    points: Array = _points(shape.geometry) @ place.rotation.T + place.translation
+    return points
+
+
+def _points(shape: Any) -> Array:
     """Return points whose hull is a shape, shape (n, 3), in its frame [m]; none if unknown."""
     match shape:
         case coal.Box():
@@ -88,13 +99,8 @@ def sphere_directions() -> Array:
     i = np.arange(_N_DIRECTIONS)
     z, angle = 1.0 - (2.0 * i + 1.0) / _N_DIRECTIONS, i * np.pi * (3.0 - np.sqrt(5.0))
     radius = np.sqrt(1.0 - z**2)
-    return np.vstack(
-        [
-            np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z]),
-            np.eye(3),
-            -np.eye(3),
-        ]
-    )
+    spiral = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    return np.vstack([spiral, np.eye(3), -np.eye(3)])
 
 
 def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any) -> bool:
@@ -109,8 +115,7 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
     if path is None:
         return False
     try:
-        factors = [float(x) for x in mesh.get("scale", "1 1 1").split()]
-        scale = _unit(path) * np.broadcast_to(factors, (3,))
+        scale = _unit(path) * np.array(mesh.get("scale", "1 1 1").split(), dtype=np.float64)
         loader.load(str(path), scale)
     except (RuntimeError, ValueError) as error:
         warnings.warn(
@@ -121,7 +126,7 @@ def _load_mesh(shape: ElementTree.Element, folders: Sequence[Path], loader: Any)
         )
         return False
     mesh.set("filename", str(path))
-    mesh.set("scale", " ".join(map(repr, scale.tolist())))
+    mesh.set("scale", text_of(scale))
     return True
 
 
@@ -183,6 +188,6 @@ def _inertia_box(link: ElementTree.Element) -> list[ElementTree.Element]:
     squares = 6.0 * (moments.sum() - 2.0 * moments) / float(mass.get("value", 0.0))
     shape = ElementTree.Element("collision")
     shape.extend(copy.copy(origin) for origin in link.findall("inertial/origin"))
-    size = " ".join(map(repr, np.sqrt(np.maximum(squares, 0.0)).tolist()))
+    size = text_of(np.sqrt(np.maximum(squares, 0.0)))
     ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "box", size=size)
     return [shape]

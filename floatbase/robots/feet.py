@@ -14,7 +14,7 @@ import pinocchio as pin
 from floatbase._validation import Array, as_positive, short_repr
 from floatbase.errors import InputError
 from floatbase.robots._checks import clamp_to_limits, has_floating_base, joint_limits
-from floatbase.robots._shapes import link_shapes, shape_points
+from floatbase.robots._shapes import link_shapes, placed_points
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
@@ -24,12 +24,15 @@ _SOLE_JOINTS = 5
 _MIN_UPRIGHT = 0.9  # vertical component of the z axis of a frame in which a sole can be given
 _SOLE_DEPTH = 0.02  # of a foot's size: points that are higher above the lowest one do not touch
 _MIN_SOLE = 0.4  # least length and width of a sole, relative to those of the foot
-_MAX_ECCENTRICITY = 0.25  # of a wheel: distance of its middle from its axis, relative to its radius
+_MIN_ROUNDNESS = 0.75  # of a wheel: how far it extends in any direction, relative to its radius
+_CIRCLE = np.exp(2j * np.pi * np.arange(24) / 24).view(float).reshape(-1, 2)  # directions
 _BEND = 0.5  # rad or m: change of all joints that takes a leg out of a singular posture
 # ratio of a leg's smallest to its largest singular value below which the leg counts as singular:
 # about sin θ / 5 for two equal links that are θ from straight, so this is 3°
 _MIN_SINGULAR_VALUE = 0.01
-_CROUCH = 0.05  # of a leg's height: by how much bent legs are shorter than straight ones
+# of a leg's height: by how much bent legs on soles and on balls are shorter than straight ones.
+# `Walk` makes no steps with a leg on a ball that is less than 0.1 shorter
+_CROUCH_ON_SOLES, _CROUCH = 0.05, 0.2
 _KICK = 0.3  # rad or m: first change of the joints of a straight leg, which shows how it bends
 _NEARNESS = 1e-3  # weight of the joints' distance from the given posture: m per rad
 _MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull of `_NEARNESS`
@@ -119,7 +122,7 @@ def _find_feet(model: pin.Model, urdf: str, folders: Sequence[Path], q: Array) -
     lowest = dict[int, tuple[float, str]]()  # height of the lowest point of a limb, and its link
     for joint in ends:
         heights = [
-            (float(_points(data.oMi[joint], shape)[:, 2].min()), _link_of(model, shape))
+            (float(placed_points(shape, data.oMi[joint])[:, 2].min()), _link_of(model, shape))
             for shape in shapes
             if shape.parentJoint == joint
         ] or [
@@ -160,15 +163,15 @@ def _bent_posture(robot: Robot) -> Array | None:
     legs = sorted({i for f in frames for i in model.supports[model.frames[f].parentJoint]} - {0, 1})
     if not legs:  # the feet belong to the base
         return None
-    columns = np.array([model.idx_vs[i] for i in legs])
+    columns = np.array(model.idx_vs)[legs]
+    flat = np.array([foot.is_flat for foot in robot.feet])
 
-    def feet(q: Array) -> list[tuple[Array, Array]]:
-        """Return the middle of each foot and the z axis of its frame."""
+    def feet(q: Array) -> tuple[Array, Array]:
+        """Return the middles of the feet, (n, 3), and the tilts of the flat ones, (m, 2)."""
         pin.framesForwardKinematics(model, data, q)
-        return [
-            (data.oMf[frame].act(np.array(foot.middle)), data.oMf[frame].rotation[:, 2])
-            for frame, foot in zip(frames, robot.feet, strict=True)
-        ]
+        pairs = list(zip([data.oMf[frame] for frame in frames], robot.feet, strict=True))
+        middles = np.array([pose.act(np.array(foot.middle)) for pose, foot in pairs])
+        return middles, np.array([pose.rotation[:2, 2] for pose, _ in pairs])[flat]
 
     def bend(x: Array) -> Array:
         """Return the posture after a displacement of the legs' joints."""
@@ -176,21 +179,15 @@ def _bent_posture(robot: Robot) -> Array | None:
         v[columns] = x
         return np.asarray(pin.integrate(model, start, v))
 
-    now, straight = feet(start), feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
-    top = max(data.oMi[i].translation[2] for i in legs)
-    targets = [
-        np.array([x, y, max(z + _CROUCH * (top - z), present[2])])
-        for ((x, y, z), _), (present, _) in zip(straight, now, strict=True)
-    ]
+    now, _ = feet(start)
+    targets, _ = feet(np.concatenate([start[:7], pin.neutral(model)[7:]]))
+    top, z = max(data.oMi[i].translation[2] for i in legs), targets[:, 2]
+    crouch = np.array([_CROUCH_ON_SOLES if foot.is_flat else _CROUCH for foot in robot.feet])
+    targets[:, 2] = np.maximum(z + crouch * (top - z), now[:, 2])
 
     def errors(x: Array) -> Array:
-        rows = [
-            np.concatenate([middle - target, z_axis[:2] if foot.is_flat else []])
-            for (middle, z_axis), target, foot in zip(
-                feet(bend(x)), targets, robot.feet, strict=True
-            )
-        ]
-        return np.concatenate(rows)
+        middles, tilts = feet(bend(x))
+        return np.concatenate([(middles - targets).ravel(), tilts.ravel()])
 
     lower, upper = np.full((2, model.nv), [[-np.inf], [np.inf]])
     joints, index, low, high = joint_limits(model)
@@ -223,21 +220,14 @@ def _link_of(model: pin.Model, shape: Any) -> str:
 def _shapes_of(
     model: pin.Model, urdf: str, folders: Sequence[Path], joints: Sequence[int]
 ) -> list[Any]:
-    """Return the shapes of the links that joints move, without stand-ins for missing meshes."""
+    """Return the shapes of the links that joints move, without stand-ins for missing meshes.
+
+    A shape without a size marks a place, and nothing touches it.
+    """
     links = {link for joint in joints for link in _links_of(model, joint)}
     shapes, incomplete = link_shapes(model, urdf, folders, links=links)
-    return [
-        shape
-        for shape in shapes
-        if _link_of(model, shape) not in incomplete and len(shape_points(shape.geometry))
-    ]
-
-
-def _points(placement: pin.SE3, shape: Any) -> Array:
-    """Return points whose hull is a shape, shape (n, 3), where its joint has a placement [m]."""
-    place = placement * shape.placement
-    points: Array = shape_points(shape.geometry) @ place.rotation.T + place.translation
-    return points
+    found = [shape for shape in shapes if _link_of(model, shape) not in incomplete]
+    return [shape for shape in found if len(p := placed_points(shape)) and np.ptp(p, axis=0).any()]
 
 
 def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Sequence[str]) -> Foot:
@@ -254,34 +244,41 @@ def _make_foot(model: pin.Model, data: pin.Data, shapes: list[Any], links: Seque
         return Foot(links[0])
     straight = model.createData()
     pin.framesForwardKinematics(model, straight, clamp_to_limits(model, pin.neutral(model)))
-    foot = _wheel(model, frame, own) if model.nqs[joint] == 2 else None
-    if foot is not None:
-        return foot
+    wheel = _wheel(model, frame, own) if _turns_freely(model, joint) else None
+    if wheel is not None:
+        return wheel
     world = data.oMi[joint]
     for link in links if n_joints >= _SOLE_JOINTS else ():
         link_frame = model.getFrameId(link, pin.BODY)
         if straight.oMf[link_frame].rotation[2, 2] > _MIN_UPRIGHT:
-            corners = _sole(model.frames[link_frame].placement.inverse(), own)
+            corners = _sole(model.frames[link_frame].placement.inverse(), on_joint)
             if corners is not None:
                 return Foot(link, corners=corners)
-    lowest = min(own, key=lambda shape: float(_points(world, shape)[:, 2].min()))
+    lowest = min(own, key=lambda shape: float(placed_points(shape, world)[:, 2].min()))
     return _ball(frame, world, lowest)
 
 
+def _turns_freely(model: pin.Model, joint: int) -> bool:
+    """Return whether a joint can make a whole turn."""
+    joints, _, lower, upper = joint_limits(model)
+    is_angle = model.joints[joint].shortname().startswith("JointModelR")
+    return bool(is_angle and np.all((upper - lower)[joints == joint] >= 2.0 * np.pi))
+
+
 def _wheel(model: pin.Model, frame: pin.Frame, shapes: list[Any]) -> Foot | None:
-    """Return the ball with the radius of a wheel, or None if a link does not surround its axis."""
+    """Return the wheel or driven ball that shapes form, or None if they are not round."""
     joint, data = frame.parentJoint, model.createData()
-    axis = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
-    axis = axis[3:, model.idx_vs[joint]]
-    points = np.vstack([_points(pin.SE3.Identity(), shape) for shape in shapes])
+    J = pin.computeJointJacobian(model, data, pin.neutral(model), joint)
+    axis, points = J[3:, model.idx_vs[joint]], np.vstack(list(map(placed_points, shapes)))
     along = points @ axis
-    across = points - np.outer(along, axis)
+    across = points @ np.linalg.svd(axis[None])[2][1:].T
     radius = float(np.linalg.norm(across, axis=1).max())
-    eccentricity = np.linalg.norm(0.5 * (across.min(axis=0) + across.max(axis=0)))
-    if eccentricity > _MAX_ECCENTRICITY * radius:
+    if (across @ _CIRCLE.T).max(axis=0).min() < _MIN_ROUNDNESS * radius:
         return None
     centre = frame.placement.actInv(0.5 * (along.min() + along.max()) * axis)
-    return Foot(str(frame.name), round(radius, _DIGITS), centre.round(_DIGITS))
+    is_ball = all(isinstance(shape.geometry, coal.Sphere) for shape in shapes)
+    axle = None if is_ball else (frame.placement.rotation.T @ axis).round(_DIGITS)
+    return Foot(str(frame.name), round(radius, _DIGITS), centre.round(_DIGITS), axis=axle)
 
 
 def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
@@ -293,7 +290,7 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
         [
             [placement.act(shape.placement.translation) - [0.0, 0.0, shape.geometry.radius]]
             if isinstance(shape.geometry, coal.Sphere)
-            else _points(placement, shape)
+            else placed_points(shape, placement)
             for shape in shapes
         ]
     )
@@ -302,8 +299,7 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
     if len(sole) < 3 or np.any(np.ptp(sole[:, :2], axis=0) < _MIN_SOLE * size) or not size.all():
         return None
     # the corners farthest to the front left, front right, rear right and rear left
-    farthest = [int(np.argmax(sole[:, :2] @ (sign / size))) for sign in _DIAGONALS]
-    farthest = list(dict.fromkeys(farthest))
+    farthest = list(dict.fromkeys((sole[:, :2] @ (_DIAGONALS / size).T).argmax(axis=0).tolist()))
     if len(farthest) < 3:
         return None
     corners = np.column_stack([sole[farthest, :2], np.full(len(farthest), bottom)])
@@ -315,7 +311,7 @@ def _ball(frame: pin.Frame, world: pin.SE3, shape: Any) -> Foot:
     if isinstance(shape.geometry, coal.Sphere):
         radius, centre = shape.geometry.radius, shape.placement.translation
     else:
-        points = _points(world, shape)
+        points = placed_points(shape, world)
         size, bottom = np.ptp(points, axis=0), points[:, 2].min()
         radius = 0.5 * size.min()
         low = points[points[:, 2] < bottom + _SOLE_DEPTH * size.max()].mean(axis=0)

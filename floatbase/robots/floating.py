@@ -46,12 +46,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
             f"The base of {robot.name} is already floating. with_floating_base needs a robot with "
             f"a fixed base, such as ur5."
         )
-    floating = load_urdf(
-        robot.urdf,
-        name=robot.name,
-        torque_limits=robot.torque_limits,
-        feet=(),
-    )
+    floating = load_urdf(robot.urdf, name=robot.name, torque_limits=robot.torque_limits, feet=())
     model = floating.model.copy()
     model.armature = np.concatenate([np.zeros(6), robot.model.armature])  # not in the URDF
     width, thickness = PLATE_SIZE

@@ -64,6 +64,17 @@ def read_numbers(element: ElementTree.Element | None, name: str) -> Array:
     return np.array(text.split(), dtype=np.float64)
 
 
+def text_of(numbers: npt.ArrayLike) -> str:
+    """Return numbers as a URDF has them, without rounding."""
+    return " ".join(map(repr, np.ravel(numbers).astype(float).tolist()))
+
+
+def origin_attributes(place: pin.SE3) -> dict[str, str]:
+    """Return the attributes of an <origin>."""
+    rpy = pin.rpy.matrixToRpy(place.rotation)
+    return {"xyz": text_of(place.translation), "rpy": text_of(rpy)}
+
+
 def read_inertia(link: ElementTree.Element) -> pin.Inertia:
     """Return the inertia of a link in the link's frame; zero without <inertial>."""
     inertia = pin.Inertia.Zero()
@@ -84,8 +95,7 @@ def _write_inertia(link: ElementTree.Element, inertia: pin.Inertia) -> None:
     for old in link.findall("inertial"):
         link.remove(old)
     inertial, tensor = ElementTree.SubElement(link, "inertial"), inertia.inertia
-    position = " ".join(repr(float(x)) for x in inertia.lever)
-    ElementTree.SubElement(inertial, "origin", xyz=position, rpy="0 0 0")
+    ElementTree.SubElement(inertial, "origin", xyz=text_of(inertia.lever), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
     upper = zip(_UPPER, tensor[np.triu_indices(3)], strict=True)
     ElementTree.SubElement(inertial, "inertia", {f"i{axes}": repr(float(x)) for axes, x in upper})

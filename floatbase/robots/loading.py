@@ -15,31 +15,15 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import (
-    Array,
-    as_bool,
-    as_string,
-    as_strings,
-    short_repr,
-)
+from floatbase._validation import Array, as_bool, as_string, as_strings, short_repr
 from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
-from floatbase.robots._checks import (
-    as_posture,
-    clamp_to_limits,
-    has_floating_base,
-    with_angles,
-)
+from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
+from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
 from floatbase.robots.feet import as_feet, with_bent_legs
-from floatbase.robots.plausibility import (
-    missing_meshes_message,
-    passive_joints_message,
-    problems,
-    straight_legs_message,
-)
+from floatbase.robots.plausibility import missing_meshes_message, passive_joints_message, problems
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
-    check_couplings,
     check_model,
     normalize_urdf,
     parse_urdf,
@@ -71,8 +55,9 @@ def load(
     torque_limits: npt.ArrayLike | None = None,
     posture: npt.ArrayLike | Mapping[str, float] | None = None,
     locked: Sequence[str] = (),
+    **file_options: Any,
 ) -> Robot:
-    """Load a robot by name.
+    """Load a robot by name, or from a file.
 
     Parameters
     ----------
@@ -90,11 +75,13 @@ def load(
     posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. By
         default the one that comes with the robot, with its joints brought within their limits. A
-        mapping changes joints of that posture [rad or m]; a * in a name stands for any characters,
-        as in {"*_knee": 0.6}.
+        mapping changes joints of that posture [rad or m]; an asterisk in a name stands for any
+        characters, as in ``{"*_knee": 0.6}``.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. Fixed joints have no entry in q, v
         and τ.
+    **file_options
+        Other arguments of `load_urdf` or `load_mjcf`, if `name` is a path.
 
     Returns
     -------
@@ -106,15 +93,22 @@ def load(
     UnknownNameError
         If there is no robot, frame or joint with a given name; the message lists similar names.
     InputError
-        If the feet, limits or posture do not fit the robot, if joints are coupled by <mimic>, or if
-        the robot's inertia matrix M is singular.
+        If the feet, limits or posture do not fit the robot, if coupled joints follow each other, or
+        if the robot's inertia matrix M is singular.
 
     Warns
     -----
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres.
+        are not in metres. Also if joints are coupled: a joint that follows another joint by
+        <mimic>, and its leader, are locked in the posture.
+
+    Notes
+    -----
+    In the posture, the positions of followers are those that their leaders require. If `locked`
+    names all followers of a leader, the leader itself remains free. Its followers are then locked,
+    unlike those of the real robot.
 
     Examples
     --------
@@ -124,7 +118,7 @@ def load(
     import example_robot_data as data
 
     name = str(name) if isinstance(name, Path) else name
-    load_file = file_loader(name)
+    load_file = _file_loader(name)
     if load_file is not None:
         return load_file(
             name,
@@ -133,6 +127,11 @@ def load(
             torque_limits=torque_limits,
             posture=posture,
             locked=locked,
+            **file_options,
+        )
+    if file_options:
+        raise InputError(
+            f"{', '.join(file_options)}: only robots from a file have these options, not {name}."
         )
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
@@ -140,16 +139,11 @@ def load(
     root = Path(data.getModelPath(path)).resolve()
     urdf = normalize_urdf(name, read_text(root / path), loader.free_flyer)
     model = parse_urdf(name, urdf, loader.free_flyer)
-    srdf = (
-        root / loader.path / loader.srdf_subpath / loader.srdf_filename
-        if loader.srdf_filename
-        else None
-    )
     # also if a posture is given, since it reads the rotor inertias
-    start = _reference_posture(model, loader, srdf, entry)
+    start = _reference_posture(model, loader, root, entry)
     if loader.__init__ is not data.robots_loader.RobotLoader.__init__:
         start = _posture_of_modified_robot(name, loader, model)
-    robot = _make_robot(
+    return _make_robot(
         name,
         urdf,
         model,
@@ -163,22 +157,10 @@ def load(
         description=entry.description,
         sources=entry.sources,
     )
-    return _checked(robot, feet)
 
 
-def file_loader(path: str) -> Callable[..., Robot] | None:
-    """Choose the function that loads a robot's file, according to its outermost element.
-
-    Parameters
-    ----------
-    path : str
-        Path of a file, or the name of a robot.
-
-    Returns
-    -------
-    callable or None
-        `load_urdf` or `load_mjcf`; None unless the path ends like a URDF or MJCF file.
-    """
+def _file_loader(path: str) -> Callable[..., Robot] | None:
+    """Return the function that loads a file of this name and content; None for a robot's name."""
     endings = *_FILE_ENDINGS, ".xacro", ".sdf"  # of these, load_urdf says what to run first
     if not isinstance(path, str) or not path.lower().endswith(endings):
         return None
@@ -226,9 +208,10 @@ def load_urdf(
         Torque limits [N·m]; by default those of the URDF.
     posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. A mapping
-        holds some joints [rad or m]; a * in a name stands for any characters, as in {"*_knee":
-        0.6}, and later entries take precedence. Other joints are at zero, or at the limit nearest
-        to zero. By default all joints are, except that legs which would be straight are bent.
+        holds some joints [rad or m]; an asterisk in a name stands for any characters, as in
+        ``{"*_knee": 0.6}``, and later entries take precedence. Other joints are at zero, or at the
+        limit nearest to zero. By default all joints are, except that legs which would be straight
+        are bent.
     locked : sequence of str, optional
         Names of joints to fix at their positions in the posture. They have no entry in q, v and τ.
 
@@ -250,8 +233,9 @@ def load_urdf(
     RobotWarning
         If the robot probably cannot stand: legs that remain straight without a posture, one or two
         feet that are points, motors that are too weak, a base that is upside down, or lengths that
-        are not in metres. Also if mesh files are missing, if only some joints have a torque limit,
-        or if the URDF has settings for MuJoCo, which are ignored.
+        are not in metres. Also if joints are coupled, as in `load`, if mesh files are missing, if
+        only some joints have a torque limit, or if the URDF has settings for MuJoCo, which are
+        ignored.
 
     Notes
     -----
@@ -267,14 +251,12 @@ def load_urdf(
         urdf = urdf.lstrip(_WHITESPACE)
     else:
         file = Path(os.path.expanduser(urdf))
-        if not os.path.exists(file):  # not file.exists(), which raises for a name that is too long
-            import example_robot_data as data
-
-            if urdf in data.robots_loader.ROBOTS:
-                raise InputError(
-                    f"There is no file {urdf}, but there is a robot with this name. Load it with "
-                    f'fb.load("{urdf}").'
-                )
+        # not file.exists(), which raises for a name that is too long
+        if urdf in CATALOGUE and not os.path.exists(file):
+            raise InputError(
+                f"There is no file {urdf}, but there is a robot with this name. Load it with "
+                f'fb.load("{urdf}").'
+            )
         urdf, directories = read_text(file), (*directories, file.resolve().parent)
     urdf = normalize_urdf(name, urdf, floating)
     model = parse_urdf(name, urdf, floating)
@@ -289,12 +271,13 @@ def load_urdf(
         feet,
         foot_radius,
         package_dirs=directories,
+        choose_posture=posture is None,
     )
-    messages = [
-        passive_joints_message(robot) if torque_limits is None else "",
-        missing_meshes_message(robot) if directories else "",
-    ]
-    return _checked(robot, feet, messages, bend_legs=posture is None)
+    if torque_limits is None:
+        _warn(passive_joints_message(robot))
+    if directories:
+        _warn(missing_meshes_message(robot))
+    return robot
 
 
 def load_mjcf(
@@ -355,19 +338,21 @@ def load_mjcf(
     -----
     RobotWarning
         If the file contains parts that the robot does not have, such as tendons, springs,
-        constraints and other free bodies, or for the same reasons as in `load_urdf`.
+        constraints and other free bodies, or for the same reasons as in `load_urdf`. A linear
+        equality constraint between two joints couples them like <mimic> in a URDF.
     """
     from floatbase.robots.mjcf import read_mjcf  # imports MuJoCo
 
-    file = Path(
-        os.path.expanduser(as_string("path", str(path) if isinstance(path, Path) else path))
-    )
+    path = as_string("path", str(path) if isinstance(path, Path) else path)
+    file = Path(os.path.expanduser(path))
     if floating is not None:
         as_bool("floating", floating)
     name = file.stem if name is None else as_string("name", name)
     keyframe = posture if isinstance(posture, str) else None
     mjcf = read_mjcf(name, file, floating, keyframe)
-    robot = _make_robot(
+    if mjcf.differences:
+        _warn(f"{name} is loaded from its MJCF {', '.join(mjcf.differences)}.")
+    return _make_robot(
         name,
         mjcf.urdf,
         mjcf.model,
@@ -376,14 +361,10 @@ def load_mjcf(
         torque_limits,
         feet,
         foot_radius,
-        package_dirs=(mjcf.folder,),
+        package_dirs=(file.resolve().parent,),
+        choose_posture=posture is None,
+        bend_legs=not mjcf.has_keyframes,
     )
-    messages = (
-        [f"{name} differs from its MJCF. It is loaded {', '.join(mjcf.differences)}."]
-        if mjcf.differences
-        else []
-    )
-    return _checked(robot, feet, messages, bend_legs=posture is None and not mjcf.has_keyframes)
 
 
 def _as_directories(paths: Sequence[str | Path]) -> tuple[Path, ...]:
@@ -408,51 +389,53 @@ def _make_robot(
     known_feet: tuple[Foot, ...] | None = None,
     *,
     package_dirs: tuple[Path, ...],
+    choose_posture: bool = False,
+    bend_legs: bool = True,
     **fields: Any,
 ) -> Robot:
-    """Build a robot from a URDF text and its model, after locking joints and checking the URDF."""
+    """Build a robot from a URDF text and its model, and warn about it.
+
+    If the posture is not the user's choice, legs that would be straight are bent or warned about.
+    """
     locked, floating = as_strings("locked", locked), has_floating_base(model)
-    if locked:
+    joints = list(model.names)[2 if floating else 1 :]
+    for joint in locked:
+        if joint not in joints:
+            raise unknown_name(
+                f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
+            )
+    couplings = read_couplings(urdf)
+    if locked or couplings:
         full_model, q = model, as_posture(name, model, posture)
-        joints = list(full_model.names)[2 if floating else 1 :]
-        for joint in locked:
-            if joint not in joints:
-                raise unknown_name(
-                    f"joint of {name}", joint, joints, "Joints that are already fixed need no lock."
-                )
+        q = with_followers_placed(name, model, q, couplings)
+        locked = (*locked, *lock_coupled_joints(name, joints, couplings, locked))
         urdf = with_locked_joints(urdf, full_model, q, locked)
         model = parse_urdf(name, urdf, floating)
         kept_joints = [
             full_model.joints[full_model.getJointId(joint)] for joint in list(model.names)[1:]
         ]
-        posture = [x for joint in kept_joints for x in q[joint.idx_q :][: joint.nq]]
-        model.armature = np.array(
-            [x for joint in kept_joints for x in full_model.armature[joint.idx_v :][: joint.nv]]
-        )
-    check_couplings(name, urdf)
+        positions = (q[joint.idx_q :][: joint.nq] for joint in kept_joints)
+        armatures = (full_model.armature[joint.idx_v :][: joint.nv] for joint in kept_joints)
+        posture = np.concatenate([[], *positions])  # none if all joints of an arm are locked
+        model.armature = np.concatenate([[], *armatures])
     check_model(name, model)
     if torque_limits is None:
         effort = np.array(model.effortLimit)[6 if floating else 0 :]
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
     posture = as_posture(name, model, posture)
-    feet = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
-    return Robot(name, model, urdf, package_dirs, feet, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
-
-
-def _checked(
-    robot: Robot,
-    feet: Sequence[str | Foot] | None,
-    messages: Sequence[str] = (),
-    bend_legs: bool = False,
-) -> Robot:
-    """Return a robot, with bent legs if requested, after warnings about it and further ones."""
-    if bend_legs:
+    found = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    robot = Robot(name, model, urdf, package_dirs, found, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
+    if choose_posture and bend_legs:
         robot = with_bent_legs(robot)
-        messages = [*messages, straight_legs_message(robot)]
-    for message in (*messages, *problems(robot, feet or ())):
-        if message:
-            warn(message, RobotWarning)
+    for message in problems(robot, feet or (), choose_posture):
+        _warn(message)
     return robot
+
+
+def _warn(message: str) -> None:
+    """Warn about a robot, unless the message is empty."""
+    if message:
+        warn(message, RobotWarning)
 
 
 def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
@@ -476,24 +459,20 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
     return known[name]
 
 
-def _reference_posture(
-    model: pin.Model, loader: Any, srdf: Path | None, entry: CatalogueEntry
-) -> Array:
+def _reference_posture(model: pin.Model, loader: Any, root: Path, entry: CatalogueEntry) -> Array:
     """Return the reference posture of the SRDF with the joint angles of the catalogue.
 
     The rotor inertias of the SRDF are stored in the model.
     """
     q = pin.neutral(model)
-    if srdf is not None:
+    if loader.srdf_filename:
+        srdf = str(root / loader.path / loader.srdf_subpath / loader.srdf_filename)
         if loader.has_rotor_parameters:
-            pin.loadRotorParameters(model, str(srdf), False)
+            pin.loadRotorParameters(model, srdf, False)
             model.armature = model.rotorInertia * model.rotorGearRatio**2
-        pin.loadReferenceConfigurations(model, str(srdf), False)
-        q = np.array(
-            {found.key(): found.data() for found in model.referenceConfigurations}.get(
-                loader.ref_posture, q
-            )
-        )
+        pin.loadReferenceConfigurations(model, srdf, False)
+        postures = {found.key(): found.data() for found in model.referenceConfigurations}
+        q = np.array(postures.get(loader.ref_posture, q))
     for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle
     return clamp_to_limits(model, pin.normalize(model, q))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
@@ -22,6 +21,7 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots._checks import clamp_to_limits
+from floatbase.robots.inertia import origin_attributes, text_of
 from floatbase.robots.urdf import parse_urdf, read_text
 
 _Joint, _Geom = mujoco.mjtJoint, mujoco.mjtGeom
@@ -39,7 +39,6 @@ class Mjcf(NamedTuple):
     urdf: str
     model: pin.Model
     posture: Array
-    folder: Path
     has_keyframes: bool
     differences: list[str]  # between the robot and the file
 
@@ -76,7 +75,7 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
         armature[joint.idx_v] = writer.rotor_inertia(i)
     model.armature = armature
     posture = clamp_to_limits(model, pin.normalize(model, q))
-    return Mjcf(urdf, model, posture, folder, compiled.nkey > 0, writer.differences(missing))
+    return Mjcf(urdf, model, posture, compiled.nkey > 0, writer.differences(missing))
 
 
 def _drop_what_is_missing(spec: mujoco.MjSpec, folder: Path) -> list[str]:
@@ -129,6 +128,7 @@ class _Writer:
         self._bodies = bodies
         moved = enumerate(model.jnt_bodyid.tolist())
         self.joints = [joint for joint, b in moved if b in bodies and b != self.root]
+        self._couplings = self._find_couplings()
         self._links, self._joint_elements = dict[str, str](), dict[str, str]()  # by name
 
     def _find_root(self, floating: bool) -> int:
@@ -150,13 +150,35 @@ class _Writer:
         """Return whether the bodies below a child of the world belong to the robot."""
         return bool(root == self.root if self.root else root not in self.free)
 
+    def _find_couplings(self) -> dict[int, int]:
+        """Return the joints whose positions are linear in that of a joint, and the constraints."""
+        model, couplings = self._model, dict[int, int]()
+        is_coupling = (model.eq_type == int(mujoco.mjtEq.mjEQ_JOINT)) & (model.eq_active0 != 0)
+        is_coupling &= ~model.eq_data[:, 2:5].any(axis=1)
+        is_coupling &= np.isin(model.eq_obj1id, self.joints) & np.isin(model.eq_obj2id, self.joints)
+        for constraint in np.flatnonzero(is_coupling).tolist():
+            couplings.setdefault(int(model.eq_obj1id[constraint]), constraint)
+        return couplings
+
+    def _mimic(self, joint: int) -> str:
+        """Write the coupling of a joint to its leader, if it has one."""
+        if joint not in self._couplings:
+            return ""
+        model, constraint = self._model, self._couplings[joint]
+        leader, (constant, slope) = model.eq_obj2id[constraint], model.eq_data[constraint, :2]
+        rest, leader_rest = model.qpos0[model.jnt_qposadr[[joint, leader]]]
+        return (
+            f"<mimic joint={quoteattr(self.label('joint', leader))} multiplier='{text_of(slope)}' "
+            f"offset='{text_of(rest + constant - slope * leader_rest)}'/>"
+        )
+
     def label(self, kind: str, number: int) -> str:
         """Return the name of a body, joint, geom, …, or one made from its number."""
         return getattr(self._model, kind)(number).name or f"{kind}_{number}"
 
-    def _labels(self, kind: str, numbers: Iterable[int]) -> list[str]:
+    def _labels(self, kind: str, numbers: npt.ArrayLike) -> list[str]:
         """Return the names of several bodies, joints, …."""
-        return [self.label(kind, number) for number in numbers]
+        return [self.label(kind, number) for number in np.array(numbers, dtype=int).tolist()]
 
     def urdf(self) -> str:
         """Write the URDF."""
@@ -180,10 +202,10 @@ class _Writer:
         R = _placement(np.zeros(3), model.body_iquat[body]).rotation
         tensor = R @ np.diag(model.body_inertia[body]) @ R.T
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]
-        entries = " ".join(f"i{'xyz'[i]}{'xyz'[j]}='{_text(tensor[i, j])}'" for i, j in pairs)
+        entries = " ".join(f"i{'xyz'[i]}{'xyz'[j]}='{text_of(tensor[i, j])}'" for i, j in pairs)
         self._links[name] = (
             f"<inertial>{_origin(_offset(model.body_ipos[body]))}"
-            f"<mass value='{_text(model.body_mass[body])}'/><inertia {entries}/></inertial>"
+            f"<mass value='{text_of(model.body_mass[body])}'/><inertia {entries}/></inertial>"
         )
         if body == self.root:
             return
@@ -225,11 +247,12 @@ class _Writer:
         place = place * (pin.SE3(pin.exp3(back), np.zeros(3)) if is_hinge else _offset(back))
         lower, upper = model.jnt_range[joint] if limited else np.zeros(2)
         dof = model.jnt_dofadr[joint]
+        effort = text_of(self._largest_torque(joint))
         rest = (
-            f"<axis xyz='{_text(model.jnt_axis[joint])}'/><limit lower='{_text(lower)}' "
-            f"upper='{_text(upper)}' effort='{_text(self._largest_torque(joint))}' velocity='0'/>"
-            f"<dynamics damping='{_text(model.dof_damping[dof])}' "
-            f"friction='{_text(model.dof_frictionloss[dof])}'/>"
+            f"<axis xyz='{text_of(model.jnt_axis[joint])}'/><limit lower='{text_of(lower)}' "
+            f"upper='{text_of(upper)}' effort='{effort}' velocity='0'/>"
+            f"<dynamics damping='{text_of(model.dof_damping[dof])}' "
+            f"friction='{text_of(model.dof_frictionloss[dof])}'/>{self._mimic(joint)}"
         )
         kind_name = "continuous" if is_hinge and not limited else _JOINT_TYPES[kind]
         self._add_joint(name, kind_name, parent, child, place, rest)
@@ -255,7 +278,7 @@ class _Writer:
         if material >= 0 and np.allclose(rgba, _NO_COLOUR):
             rgba = model.mat_rgba[material]
         is_visible = model.geom_group[geom] <= _LAST_VISIBLE_GROUP and rgba[3] > 0.0
-        colour = f"<material name='{_text(rgba)}'><color rgba='{_text(rgba)}'/></material>"
+        colour = f"<material name='{text_of(rgba)}'><color rgba='{text_of(rgba)}'/></material>"
         for shape, offset in shapes:
             text = f"{_origin(place * offset)}<geometry>{shape}</geometry>"
             if is_visible:
@@ -268,33 +291,33 @@ class _Writer:
         model, middle = self._model, pin.SE3.Identity()
         kind, size = _Geom(int(model.geom_type[geom])), model.geom_size[geom]
         place = _placement(model.geom_pos[geom], model.geom_quat[geom])
-        ball = f"<sphere radius='{_text(size[0])}'/>"
-        cylinder = f"<cylinder radius='{_text(size[0])}' length='{_text(2.0 * size[1])}'/>"
-        if kind == _Geom.mjGEOM_SPHERE:
-            return [(ball, middle)], place
-        if kind == _Geom.mjGEOM_CYLINDER:
-            return [(cylinder, middle)], place
-        if kind == _Geom.mjGEOM_CAPSULE:
-            ends = [(ball, _offset([0.0, 0.0, z])) for z in (-size[1], size[1])]
-            return [(cylinder, middle), *ends], place
+        ball = f"<sphere radius='{text_of(size[0])}'/>"
+        cylinder = f"<cylinder radius='{text_of(size[0])}' length='{text_of(2.0 * size[1])}'/>"
+        ends = [(ball, _offset([0.0, 0.0, z])) for z in (-size[1], size[1])]
+        round_shapes = {
+            _Geom.mjGEOM_SPHERE: [(ball, middle)],
+            _Geom.mjGEOM_CYLINDER: [(cylinder, middle)],
+            _Geom.mjGEOM_CAPSULE: [(cylinder, middle), *ends],
+        }
+        if kind in round_shapes:
+            return round_shapes[kind], place
         if kind == _Geom.mjGEOM_MESH:
             mesh = model.geom_dataid[geom]
             asset = self._spec.meshes[mesh]
             path = _mesh_path(self._spec, asset, self._folder)
             is_moved = asset.refpos.any() or asset.refquat[0] != 1.0
             if asset.file and path.suffix.lower() in _MESH_FILES and not is_moved:
-                file = quoteattr(
-                    f"package://{Path(os.path.relpath(path, self._folder)).as_posix()}"
-                )
+                location = Path(os.path.relpath(path, self._folder)).as_posix()
+                file = quoteattr(f"package://{location}")
                 # MuJoCo moves the origin of a mesh to its centre of mass
                 centre = _placement(model.mesh_pos[mesh], model.mesh_quat[mesh])
-                shape = f"<mesh filename={file} scale='{_text(asset.scale)}'/>"
+                shape = f"<mesh filename={file} scale='{text_of(asset.scale)}'/>"
                 return [(shape, middle)], place * centre.inverse()
         if kind not in (_Geom.mjGEOM_BOX, _Geom.mjGEOM_ELLIPSOID, _Geom.mjGEOM_MESH):
             return [], place  # planes are no part of a robot
         # the box itself, or that around an ellipsoid or another mesh
         box = model.geom_aabb[geom]
-        return [(f"<box size='{_text(2.0 * box[3:])}'/>", _offset(box[:3]))], place
+        return [(f"<box size='{text_of(2.0 * box[3:])}'/>", _offset(box[:3]))], place
 
     def configuration(self, keyframe: str | None) -> Array:
         """Return MuJoCo's qpos in a keyframe; by default in the first one, or else initially."""
@@ -349,29 +372,39 @@ class _Writer:
 
     def differences(self, missing: list[str]) -> list[str]:
         """Name everything that the robot does not have as in the file."""
-        model, joints, option = self._model, np.array(self.joints, dtype=int), self._model.opt
+        model, option = self._model, self._model.opt
+        joints, bodies = np.array(self.joints, dtype=int), np.array(self._bodies)
         is_weightless = option.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         gravity = np.zeros(3) if is_weightless else option.gravity
         is_usual = np.allclose(gravity, _GRAVITY) and option.density == option.viscosity == 0.0
-        surroundings = f"gravity {_text(gravity)}, density {option.density:g}"
-        roots = sorted(set(model.body_rootid[model.jnt_bodyid].tolist()))
+        surroundings = f"gravity {text_of(gravity)}, density {option.density:g}"
+        roots = np.unique(model.body_rootid[model.jnt_bodyid]).tolist()
         others = [root for root in roots if not self._is_of_robot(root)]
-        passive = [joint for joint in self.joints if not self._motors(joint)]
+        constraints = list(self._couplings.values())
+        coupled = {*self._couplings, *model.eq_obj2id[constraints].tolist()}  # they are locked
+        driven = [i for i in self.joints if i not in coupled and model.nactuator]
+        passive = [i for i in driven if not self._motors(i)]
         differences = {
             "without meshes whose file is missing": missing,
             "without equality constraints": self._labels(
-                "equality", np.flatnonzero(model.eq_active0).tolist()
+                "equality", sorted({*np.flatnonzero(model.eq_active0).tolist()} - {*constraints})
             ),
             "without tendons": self._labels("tendon", range(model.ntendon)),
             "without other moving bodies": self._labels("body", others),
             "without springs": self._labels("joint", joints[model.jnt_stiffness[joints] != 0.0]),
+            "without the armature of free joints": self._labels(
+                "joint",
+                [
+                    model.body_jntadr[root]
+                    for root in self.free
+                    if self._is_of_robot(root) and model.dof_armature[model.body_dofadr[root]]
+                ],
+            ),
             "without gravity compensation": self._labels(
-                "body", [body for body in self._bodies if model.body_gravcomp[body]]
+                "body", bodies[model.body_gravcomp[bodies] != 0]
             ),
             "in air with gravity of 9.81 m/s²": [] if is_usual else [f"not {surroundings}"],
-            "with motors at joints that have no actuator": self._labels(
-                "joint", passive if model.nactuator else []
-            ),
+            "with motors at joints that have no actuator": self._labels("joint", passive),
         }
         return [
             f"{difference} ({', '.join(parts[:3])}{', …' * (len(parts) > 3)})"
@@ -397,12 +430,6 @@ def _placement(position: npt.ArrayLike, wxyz: npt.ArrayLike) -> pin.SE3:
     return pin.SE3(pin.Quaternion(w, x, y, z).normalized().toRotationMatrix(), np.array(position))
 
 
-def _text(numbers: npt.ArrayLike) -> str:
-    """Return numbers as a URDF has them, without rounding."""
-    return " ".join(map(repr, map(float, np.ravel(numbers))))
-
-
 def _origin(place: pin.SE3) -> str:
     """Write a placement."""
-    rpy = pin.rpy.matrixToRpy(place.rotation)
-    return f"<origin xyz='{_text(place.translation)}' rpy='{_text(rpy)}'/>"
+    return "<origin xyz='{xyz}' rpy='{rpy}'/>".format(**origin_attributes(place))

@@ -24,12 +24,16 @@ _BALANCE_WEIGHT, _FORCE_WEIGHT = 1e6, 1e-6
 _TOLERANCE = 1e-2  # fraction of a torque limit by which the torques of the QP may be wrong
 
 
-def problems(robot: Robot, given_feet: Sequence[str | Foot]) -> list[str]:
-    """Return warnings about a robot that cannot stand, or sinks if its base is fixed."""
+def problems(robot: Robot, given_feet: Sequence[str | Foot], may_bend: bool) -> list[str]:
+    """Return warnings, or "", about a robot that cannot stand, or sinks if its base is fixed.
+
+    Straight legs are reported if `may_bend`.
+    """
     if not robot.is_floating:
         return [_weak_arm_message(robot)]
     posture = State(robot, robot.posture)
     return [
+        _straight_legs_message(robot) if may_bend else "",
         _units_message(robot, posture)
         or _upside_down_message(robot, posture)
         or _weak_motors_message(robot),
@@ -37,16 +41,16 @@ def problems(robot: Robot, given_feet: Sequence[str | Foot]) -> list[str]:
     ]
 
 
-def straight_legs_message(robot: Robot) -> str:
+def _straight_legs_message(robot: Robot) -> str:
     """Return a warning if legs are straight in the posture chosen for a robot, else ""."""
-    straight = singular_legs(robot) if robot.is_floating else []
+    straight = singular_legs(robot)
     if not straight:
         return ""
     return (
-        f"{robot.name} has no posture, so all its joints are at zero or at the nearest limit. "
-        f"The legs of {', '.join(straight)} are then singular, for example straight, and "
-        f"cannot move their feet in all directions. Pass a posture with bent legs, such as "
-        f'posture={{"name of a knee": 0.6}}, or {robot.nq - 7} joint positions.'
+        f"The legs of {robot.name} with the feet {', '.join(straight)} are singular in its default "
+        f"posture, for example straight. They cannot move their feet in all directions. Pass a "
+        f'posture with bent legs, such as posture={{"name of a knee": 0.6}}, or the positions of '
+        f"all joints."
     )
 
 
@@ -81,10 +85,15 @@ def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
     if is_stable or not 1 <= len(robot.feet) <= 2:
         return ""
     names = [foot.frame for foot in robot.feet]
+    advice = (
+        f"If it has soles, give their corners, as in "
+        f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+        if robot.feet[0].axis is None
+        else "Its wheels must move to balance it, which no task of floatbase does."
+    )
     return (
         f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
-        f"point(s) only: {', '.join(names)}. If it has soles, give their corners, as in "
-        f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
+        f"point(s) only: {', '.join(names)}. {advice}"
     )
 
 

@@ -26,6 +26,7 @@ from floatbase._validation import (
     cached_property,
     checked,
     read_only,
+    unit_vector,
 )
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots._checks import (
@@ -48,7 +49,7 @@ _PARTICIPATION_TOLERANCE = 0.05  # share in a motion without inertia above which
 
 @dataclass(frozen=True, eq=False)
 class Foot(Value):
-    """A part of a robot that can touch the ground: a ball, or a flat foot with corners.
+    """A part of a robot that can touch the ground: a ball, a wheel, or a flat foot with corners.
 
     Parameters
     ----------
@@ -56,11 +57,14 @@ class Foot(Value):
         Name of the frame that carries the foot. The z axis of a flat foot points out of the ground
         when the robot stands.
     radius : float
-        Radius of the ball [m]; 0 for a flat foot.
+        Radius of the ball or the wheel [m]; 0 for a flat foot.
     centre : array_like, shape (3,)
-        Centre of the ball in the frame [m].
+        Centre of the ball or the wheel in the frame [m].
     corners : array_like, shape (n, 3), or None
-        Corners of a flat foot in the frame [m]; None for a ball.
+        Corners of a flat foot in the frame [m]; None for a ball or a wheel.
+    axis : array_like, shape (3,), or None
+        Direction of a wheel's axle in the frame, dimensionless; it is scaled to unit length. None
+        for a ball or a flat foot.
     """
 
     frame: str = field(metadata=checked(as_string))
@@ -69,11 +73,21 @@ class Foot(Value):
         default_factory=lambda: np.zeros(3), metadata=checked(as_array, (3,), "m")
     )
     corners: Array | None = None
+    axis: Array | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.corners is not None:
             object.__setattr__(self, "corners", as_corners(self.frame, self.corners))
+        if self.axis is not None:
+            axis = unit_vector(f"axis of {self._label()}", self.axis)
+            object.__setattr__(self, "axis", axis)
+            as_positive(f"radius of {self._label()}, a wheel,", self.radius, "m")
+            if self.is_flat:
+                raise InputError(
+                    f"The foot {self.frame} has both corners and an axis. Give corners for a flat "
+                    f"foot, or an axis for a wheel."
+                )
 
     def _label(self) -> str:
         """Return the name that messages use for the foot."""
@@ -84,14 +98,34 @@ class Foot(Value):
         """Whether the foot stands on its corners rather than on one point."""
         return self.corners is not None
 
+    def depth(self, rotation: Array, normal: Array) -> float:
+        """Compute the distance from the middle of the foot down to the ground that it touches.
+
+        A wheel that leans over is less deep than its radius. A flat foot has depth 0.
+
+        Parameters
+        ----------
+        rotation : ndarray, shape (3, 3)
+            Rotation matrix from the foot's frame to the world, dimensionless.
+        normal : ndarray, shape (3,)
+            Unit normal of the ground in the world frame.
+
+        Returns
+        -------
+        float
+            Distance along the normal [m].
+        """
+        lean = 0.0 if self.axis is None else float(normal @ rotation @ self.axis)
+        return float(self.radius * max(0.0, 1.0 - lean**2) ** 0.5)
+
     @cached_property
     def points(self) -> Array:
-        """Centre of the ball, or the corners, shape (n, 3), in the frame [m]."""
+        """Centre of the ball or the wheel, or the corners, shape (n, 3), in the frame [m]."""
         return self.centre[None] if self.corners is None else self.corners
 
     @cached_property
     def middle(self) -> Array:
-        """Centre of the ball, or mean of the corners, shape (3,), in the frame [m]."""
+        """Centre of the ball or the wheel, or mean of the corners, shape (3,), in the frame [m]."""
         return read_only(self.points.mean(axis=0))
 
 
@@ -153,10 +187,9 @@ class Robot(Value):
         object.__setattr__(self, "posture", as_posture(self.name, self.model, self.posture))
         object.__setattr__(self, "torque_limits", as_torque_limits(self.d, self.torque_limits))
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
-        for foot in self.feet:
-            if [self.frame_id(other.frame) for other in self.feet].count(
-                self.frame_id(foot.frame)
-            ) > 1:
+        frames = [self.frame_id(foot.frame) for foot in self.feet]
+        for foot, frame in zip(self.feet, frames, strict=True):
+            if frames.count(frame) > 1:
                 raise InputError(
                     f"Duplicate foot {foot.frame!r} of {self.name}. Name each foot once."
                 )
@@ -183,33 +216,25 @@ class Robot(Value):
         scale = np.sqrt(np.where(M.diagonal() > 0.0, M.diagonal(), 1.0))
         values, vectors = np.linalg.eigh(M / np.outer(scale, scale))
         participation = np.abs(vectors[:, values < _SINGULAR_M]).max(axis=1, initial=0.0)
-        names = [*["its base"] * (self.nv - self.d), *self.joint_names]
-        massless = list(
-            dict.fromkeys(
-                name
-                for name, value in zip(names, participation, strict=True)
-                if value > _PARTICIPATION_TOLERANCE
-            )
-        )
-        if massless:
-            joints = [name for name in massless if name != "its base"]
-            lock_hint = f", or lock joints, as with locked={joints}" if joints else ""
-            fix_hint = (
-                ", or load the robot with floating=False if it is bolted to the ground"
-                if "its base" in massless
-                else ""
-            )
+        massless, n_base = participation > _PARTICIPATION_TOLERANCE, self.nv - self.d
+        joints = np.array(self.joint_names)[massless[n_base:]].tolist()
+        parts, hint = list(joints), f", or lock joints, as with locked={joints}" if joints else ""
+        if massless[:n_base].any():
+            parts.insert(0, "its base")
+            hint += ", or load the robot with floating=False if it is bolted to the ground"
+        if parts:
             raise InputError(
                 f"{self.name} has a singular inertia matrix M in its posture: "
-                f"{', '.join(massless)} can accelerate without moving any mass. Give these links "
-                f"mass and inertia{lock_hint}{fix_hint}."
+                f"{', '.join(parts)} can accelerate without moving any mass. Give these links "
+                f"mass and inertia{hint}."
             )
 
     @cached_property
     def _fingerprint(self) -> bytes:
         """Digest of the data for equations, simulation and viewer, the same in every process."""
         feet = [
-            (foot.frame, foot.radius, foot.is_flat, foot.points.tobytes()) for foot in self.feet
+            (foot.frame, foot.radius, foot.is_flat, foot.points.tobytes(), str(foot.axis))
+            for foot in self.feet
         ]
         numbers = self.torque_limits.tobytes(), self.posture.tobytes()
         return sha256(

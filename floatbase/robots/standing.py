@@ -17,6 +17,7 @@ from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
 _TOLERANCE = 1e-11  # m and rad: about a hundred rounding errors for a robot of 1 m
+_MAX_ERROR = 1e-6  # m and rad: of a robot without joints that could correct rounded lengths
 _MAX_STEPS = 50  # the catalogue's robots take five
 _UP = (0.0, 0.0, 1.0)  # normal of the ground
 _LEAST_RISE = 1e-9  # m: a surface that is higher above the planes by less is the plane, rounded
@@ -72,6 +73,8 @@ def find_standing_state(
         q = pin.integrate(robot.model, state.q, np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
         q[index] = np.clip(q[index], lower, upper)
         state = State(robot, q)
+    if remaining < _MAX_ERROR:
+        return state
     height_text = "" if height is None else f" with its base at height {height:g} m"
     limited = [
         f"{robot.model.names[joint]} at {x:.3g}"
@@ -144,6 +147,7 @@ def _clearance(
     middle = state.point(foot.frame, foot.middle)
     distances = normals @ middle - offsets
     nearest = int(np.argmin(distances))
+    R = state.frame_pose(foot.frame).rotation
     if surface is not None:
         under = [state.point(foot.frame, point)[:2] for point in (foot.middle, *foot.points)]
         tops = [
@@ -151,8 +155,9 @@ def _clearance(
         ]
         above_surface = middle[2] - max(tops, default=-np.inf)
         if above_surface < distances[nearest]:
-            return float(above_surface - foot.radius), np.array(_UP)
-    return float(distances[nearest] - foot.radius), normals[nearest]
+            up = np.array(_UP)
+            return float(above_surface - foot.depth(R, up)), up
+    return float(distances[nearest] - foot.depth(R, normals[nearest])), normals[nearest]
 
 
 def _plane_height(xy: Array, planes: _Planes) -> float:

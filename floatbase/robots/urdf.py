@@ -7,6 +7,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter, defaultdict
 from collections.abc import Collection
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pinocchio as pin
@@ -15,7 +16,7 @@ from floatbase._files import read_file
 from floatbase._validation import Array, short_repr
 from floatbase.errors import InputError, RobotWarning, warn
 from floatbase.robots._checks import has_floating_base
-from floatbase.robots.inertia import read_inertia, read_numbers
+from floatbase.robots.inertia import origin_attributes, read_inertia, read_numbers
 
 Element = ElementTree.Element
 
@@ -91,11 +92,11 @@ def normalize_urdf(name: str, text: str, floating: bool) -> str:
         for key, value in part.items()
     ]
     if ignored:
-        message = (
+        warn(
             f"MuJoCo's settings in the URDF of {name} are ignored: {', '.join(ignored)}. They "
-            f"would change the simulation, but not the controller."
+            f"would change the simulation, but not the controller.",
+            RobotWarning,
         )
-        warn(message, RobotWarning)
     _normalize_element(root, name)
     base = _check_tree(name, root)
     for joint in root.findall("joint"):
@@ -107,6 +108,11 @@ def normalize_urdf(name: str, text: str, floating: bool) -> str:
 
 def _parse_xml(name: str, text: str) -> Element:
     """Return the outermost element of a URDF; other formats are an `InputError`."""
+    # other readers accept prefixes that are not declared, such as drake:acceleration
+    prefixes = set(re.findall(r"[\s</]([A-Za-z_][\w.-]*):[A-Za-z_]", text))
+    prefixes -= {"xml", "xmlns", *re.findall(r"xmlns:([\w.-]+)", text)}
+    declarations = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(prefixes))
+    text = re.sub(r"<robot(?=\s)", f"<robot{declarations}", text, count=1)
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
@@ -194,8 +200,9 @@ def _check_tree(name: str, root: Element) -> str:
                     f"{kind}s of {name} with the name {label!r}: {count}. Give each its own name."
                 )
     links = [link.get("name", "") for link in root.findall("link")]
-    joints_of = defaultdict[str, list[str]](list)  # joints that move or hold a link
-    children = defaultdict[str, list[str]](list)
+    if not links:
+        raise InputError(f"{name} has no <link>. Give the path of a URDF file with links.")
+    parents = {link: dict[str, str]() for link in links}  # of each link, by the joint between them
     for joint in root.findall("joint"):
         label, (parent, child) = joint.get("name", ""), _ends(joint)
         missing = [link for link in (parent, child) if link not in links]
@@ -206,29 +213,25 @@ def _check_tree(name: str, root: Element) -> str:
                 else f"Joint {label!r} of {name} has the type {joint.get('type')!r}. It must be "
                 f"one of {', '.join(_JOINT_TYPES[:4])}."
             )
-        joints_of[child].append(label)
-        children[parent].append(child)
-    for link, labels in joints_of.items():
+        parents[child][label] = parent
+    for link, labels in parents.items():
         if len(labels) > 1:
             raise InputError(
                 f"Link {link!r} of {name} has {len(labels)} parents, through the joints "
                 f"{', '.join(labels)}. A URDF cannot describe closed loops. Keep one of the joints."
             )
-    roots = [link for link in links if link not in joints_of]
+    try:
+        TopologicalSorter({link: labels.values() for link, labels in parents.items()}).prepare()
+    except CycleError as error:
+        raise InputError(
+            f"The joints of {name} form a loop through {short_repr(error.args[1])}. Every link "
+            f"except the base needs one parent, and the base none. Remove a joint of the loop."
+        ) from None
+    roots = [link for link in links if not parents[link]]
     if len(roots) > 1:
         raise InputError(
             f"{len(roots)} links of {name} have no parent: {', '.join(roots)}. Only the base has "
             f"none. Connect the others with joints, or remove them."
-        )
-    reached = roots[:]
-    for link in reached:  # it grows
-        reached.extend(children[link])
-    if not links:
-        raise InputError(f"{name} has no <link>. Give the path of a URDF file with links.")
-    if loop := [link for link in links if link not in reached]:
-        raise InputError(
-            f"The joints of {name} form a loop through {short_repr(loop)}. Every link except the "
-            f"base needs one parent, and the base none. Remove a joint of the loop."
         )
     return roots[0]
 
@@ -246,6 +249,12 @@ def _normalize_joint(name: str, joint: Element) -> None:
             for element in joint.findall(tag):
                 joint.remove(element)
         return
+    mimic = joint.find("mimic")
+    if mimic is not None and not mimic.get("joint"):
+        raise InputError(
+            f"<mimic> of joint {label!r} of {name} names no joint. Add the joint that it follows, "
+            f'as in joint="finger".'
+        )
     axis = joint.find("axis")
     if axis is None:
         axis = ElementTree.SubElement(joint, "axis")
@@ -262,8 +271,8 @@ def _normalize_joint(name: str, joint: Element) -> None:
             )
         return
     lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
-    is_limited = kind in _LIMITED_JOINT_TYPES and lower != upper and not math.isinf(upper - lower)
-    if kind in _LIMITED_JOINT_TYPES and (lower > upper or math.isinf(lower) != math.isinf(upper)):
+    has_range = kind in _LIMITED_JOINT_TYPES
+    if has_range and (lower > upper or math.isinf(lower) != math.isinf(upper)):
         raise InputError(
             f"Joint {label!r} of {name} has the limits lower={lower:g} and upper={upper:g} (rad or "
             f"m; a missing limit is 0). The lower limit must not be above the upper limit. Give "
@@ -271,7 +280,7 @@ def _normalize_joint(name: str, joint: Element) -> None:
         )
     for key, value in (("lower", lower), ("upper", upper)):
         limit.attrib.pop(key, None)
-        if is_limited:
+        if has_range and lower != upper and not math.isinf(upper - lower):
             limit.set(key, repr(value))
     for key in ("effort", "velocity"):
         if math.isinf(float(limit.get(key, "0"))):
@@ -318,7 +327,17 @@ def parse_urdf(name: str, urdf: str, floating: bool) -> pin.Model:
 def check_model(name: str, model: pin.Model) -> None:
     """Raise `InputError` for a model that eqs. (1)-(7) cannot represent."""
     _check_moments_of_inertia(name, model)
-    _check_reserved_names(name, model)
+    base = next((frame for frame in model.frames if frame.name == "base"), model.frames[0])
+    if base.parentJoint > has_floating_base(model):
+        raise InputError(
+            f"A moving {'link' if base.type == pin.BODY else 'joint'} of {name} has the name base, "
+            f"which is reserved for the root link of every robot. Rename it."
+        )
+    if list(model.names).count("root_joint") > 1:
+        raise InputError(
+            f"A joint of {name} has the name root_joint, which Pinocchio uses for the joint of a "
+            f"floating base. Rename it."
+        )
     for joint in list(model.joints)[2 if has_floating_base(model) else 1 :]:
         if joint.nv > 1:
             raise InputError(
@@ -342,40 +361,6 @@ def _check_moments_of_inertia(name: str, model: pin.Model) -> None:
             )
 
 
-def _check_reserved_names(name: str, model: pin.Model) -> None:
-    """Check that the names "base" and "root_joint" are used for the base only."""
-    base_frame = next((frame for frame in model.frames if frame.name == "base"), None)
-    if base_frame is not None and base_frame.parentJoint != int(has_floating_base(model)):
-        raise InputError(
-            f"A moving {'link' if base_frame.type == pin.BODY else 'joint'} of {name} has the name "
-            f"base, which is reserved for the root link of every robot. Rename it."
-        )
-    if list(model.names).count("root_joint") > 1:
-        raise InputError(
-            f"A joint of {name} has the name root_joint, which Pinocchio uses for the joint of a "
-            f"floating base. Rename it."
-        )
-
-
-def check_couplings(name: str, urdf: str) -> None:
-    """Check that no joint mimics another joint."""
-    joints = ElementTree.fromstring(urdf).findall("joint")
-    names = [joint.get("name", "") for joint in joints if joint.get("type") != "fixed"]
-    masters = {
-        joint.get("name", ""): mimic.get("joint", "")
-        for joint in joints
-        for mimic in joint.findall("mimic")
-    }
-    if masters:
-        joint, master = next(iter(masters.items()))
-        coupled = [joint for joint in names if joint in masters or joint in masters.values()]
-        raise InputError(
-            f"Joints of {name} are coupled by <mimic>, such as {joint} to {master}. Eqs. (1)-(7) "
-            f"need a separate motor for every joint. Lock these joints with locked={coupled}, or "
-            f"remove <mimic> from the URDF if they do have separate motors."
-        )
-
-
 def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection[str]) -> str:
     """Return a URDF with some joints fixed at their positions in a configuration."""
     data, root = model.createData(), ElementTree.fromstring(urdf)
@@ -383,14 +368,8 @@ def with_locked_joints(urdf: str, model: pin.Model, q: Array, joints: Collection
     for joint in root.findall("joint"):
         if joint.get("name") in joints:
             parent, child = (data.oMf[model.getFrameId(link, pin.BODY)] for link in _ends(joint))
-            placement = parent.actInv(child)
             for element in (*joint.findall("origin"), *joint.findall("mimic")):
                 joint.remove(element)
-            numbers = {"xyz": placement.translation, "rpy": pin.rpy.matrixToRpy(placement.rotation)}
-            ElementTree.SubElement(
-                joint,
-                "origin",
-                {key: " ".join(map(repr, map(float, row))) for key, row in numbers.items()},
-            )
+            ElementTree.SubElement(joint, "origin", origin_attributes(parent.actInv(child)))
             joint.set("type", "fixed")
     return ElementTree.tostring(root, encoding="unicode")

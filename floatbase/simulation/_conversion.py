@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array
-from floatbase.robots import Robot
+from floatbase.robots import Robot, State
 
 
 class Conversion:
@@ -69,6 +69,21 @@ class Conversion:
             q[self._cos_indices + 1], q[self._cos_indices]
         )
         return qpos, qvel
+
+    def dynamics(self, data: mujoco.MjData, state: State) -> tuple[Array, Array]:
+        """Move MuJoCo's robot to a state, and return its M and h in the package's convention."""
+        nv = self._robot.nv
+        data.qpos[:], data.qvel[:] = self.to_mujoco(state.q, state.v)
+        mujoco.mj_fwdPosition(data.model, data)
+        mujoco.mj_fwdVelocity(data.model, data)
+        T, T_dot_v = np.zeros((nv, nv)), np.zeros(nv)  # qvel = T v
+        T[self.qvel_of_v, np.arange(nv)] = 1.0
+        if self._n_base:
+            T[:3, :3] = rotation_matrix(data.qpos[3:7])
+            T_dot_v[:3] = T[:3, :3] @ np.cross(state.v[3:6], state.v[:3])
+        M = np.zeros((nv, nv))
+        mujoco.mj_fullM(data.model, data, M)
+        return T.T @ M @ T, T.T @ (data.qfrc_bias + M @ T_dot_v)
 
 
 def rotation_matrix(wxyz: npt.ArrayLike) -> Array:

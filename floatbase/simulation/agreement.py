@@ -6,10 +6,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from floatbase._validation import Array
 from floatbase.errors import SimulationError
 from floatbase.robots import Robot, State
-from floatbase.simulation._conversion import Conversion, rotation_matrix
+from floatbase.simulation._conversion import Conversion
 
 _N_STATES = 2
 # relative to the largest entry; rounding leaves 1e-12, and a difference that matters is larger
@@ -26,7 +25,7 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
     }
     for seed in range(_N_STATES):
         state = robot.random_state(seed)
-        M, h = _dynamics(data, conversion, state)
+        M, h = conversion.dynamics(data, state)
         different = [
             name
             for name, (theirs, ours) in {**pairs, "M": (M, state.M), "h": (h, state.h)}.items()
@@ -40,22 +39,6 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
                 f"{', '.join(different)}{where}. The controller would assume another robot than "
                 f"the simulated one. Load the robot again if its model was changed after loading."
             )
-
-
-def _dynamics(data: mujoco.MjData, conversion: Conversion, state: State) -> tuple[Array, Array]:
-    """Move MuJoCo's robot to a state, and return its M and h in the package's convention."""
-    model, nv = data.model, state.robot.nv
-    data.qpos[:], data.qvel[:] = conversion.to_mujoco(state.q, state.v)
-    mujoco.mj_fwdPosition(model, data)
-    mujoco.mj_fwdVelocity(model, data)
-    T, T_dot_v = np.zeros((nv, nv)), np.zeros(nv)  # qvel = T v
-    T[conversion.qvel_of_v, np.arange(nv)] = 1.0
-    if state.robot.is_floating:
-        T[:3, :3] = rotation_matrix(data.qpos[3:7])
-        T_dot_v[:3] = T[:3, :3] @ np.cross(state.v[3:6], state.v[:3])
-    M = np.zeros((nv, nv))
-    mujoco.mj_fullM(model, data, M)
-    return T.T @ M @ T, T.T @ (data.qfrc_bias + M @ T_dot_v)
 
 
 def _different_links(data: mujoco.MjData, state: State) -> list[str]:

@@ -32,13 +32,8 @@ from floatbase.simulation.hulls import link_hulls
 _IMPEDANCE_RATIO = 100.0
 # s, time constant of a critically damped contact: four of the default timesteps; two is the least
 _CONTACT_TIME_CONSTANT = 0.004
-_CONTACT_IMPEDANCE = (
-    0.95,
-    0.99,
-    0.001,
-    0.5,
-    2.0,
-)  # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
+# MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
+_CONTACT_IMPEDANCE = 0.95, 0.99, 0.001, 0.5, 2.0
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
 # s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
@@ -46,6 +41,8 @@ _PENETRATION_RECOVERY_TIME = 0.2
 _CORNER_BALL_RADIUS = 0.005
 # m: MuJoCo has no balls of radius 0, which is the radius of a foot without a size
 _MIN_BALL_RADIUS = 1e-4
+# m: half of the width of a wheel's rim, which touches the ground at one point
+_RIM_WIDTH = 1e-3
 # m: boxes of the ground have no bottom, but MuJoCo's have; nothing gets below it
 _BOX_DEPTH = 10.0
 _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero (mjMINVAL)
@@ -143,14 +140,9 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         mujoco.mju_quatZ2Vec(plane.quat, normal)
     for x0, x1, y0, y1, top in ground.boxes:
-        half = 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            contype=1,
-            conaffinity=0,
-            pos=[x0 + half[0], y0 + half[1], top - half[2]],
-            size=half,
-        )
+        box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
+        centre = [x0 + half[0], y0 + half[1], top - half[2]]
+        spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
     for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
         _add_foot_balls(spec, foot, contact_of_foot.point_names)
@@ -192,11 +184,8 @@ def _spec_from_urdf(robot: Robot) -> mujoco.MjSpec:
         for body in bodies
         if body.joints or (robot.is_floating and body.parent.name == "world")
     }
-    inconsistent = [
-        body
-        for body in bodies
-        if body.name in inertias and not _is_physically_consistent(inertias[body.name])
-    ]
+    moving = [body for body in bodies if body.name in inertias]
+    inconsistent = [b for b in moving if not _is_physically_consistent(inertias[b.name])]
     if inconsistent:
         raise SimulationError(_inertia_error(robot, inconsistent, inertias[inconsistent[0].name]))
     for body in bodies:
@@ -244,15 +233,12 @@ def _fused_inertia(body: mujoco.MjsBody) -> pin.Inertia:
         # MuJoCo stores NaN for a tensor of zeros
         ixx, iyy, izz, ixy, ixz, iyz = np.nan_to_num(body.fullinertia)
         R = rotation_matrix(body.iquat)  # from the axes of <inertial> to the body's
-        tensor = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
-        inertia.mass = float(body.mass)
-        inertia.lever = np.array(body.ipos)
-        inertia.inertia = tensor
+        inertia.mass, inertia.lever = float(body.mass), np.array(body.ipos)
+        inertia.inertia = R @ np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) @ R.T
     for child in body.bodies:
         if not child.joints:
-            inertia = inertia + pin.SE3(rotation_matrix(child.quat), np.array(child.pos)).act(
-                _fused_inertia(child)
-            )
+            placement = pin.SE3(rotation_matrix(child.quat), np.array(child.pos))
+            inertia = inertia + placement.act(_fused_inertia(child))
     return inertia
 
 
@@ -271,20 +257,17 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
     others = f" (and {len(bodies) - 1} more)" if len(bodies) > 1 else ""
     joints = [joint.name for body in bodies for joint in body.joints]
-    weld = (
-        f", or weld such links to their parents with locked={joints} of fb.load" if joints else ""
-    )
+    weld = f", or weld such links to their parents with locked={joints} of fb.load"
     return (
         f"MuJoCo cannot move link {bodies[0].name!r} of {robot.name}{others}. Together with the "
-        f"links welded to it, it has "
-        f"{inertia.mass:.4g} kg and principal inertias {smallest:.4g}, {middle:.4g}, {largest:.4g} "
-        f"kg m². All of these must be positive, and no principal inertia may exceed the sum of the "
-        f"other two. Correct the URDF{weld}."
+        f"links welded to it, it has {inertia.mass:.4g} kg and principal inertias {smallest:.4g}, "
+        f"{middle:.4g}, {largest:.4g} kg m². All of these must be positive, and no principal "
+        f"inertia may exceed the sum of the other two. Correct the URDF{weld if joints else ''}."
     )
 
 
 def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
-    """Add a ball for each contact point of a foot, with the contact point as its lowest point."""
+    """Add a ball or a disc for each contact point of a foot; the point is its lowest one."""
     body = spec.body(body_name(foot.frame))
     if body is None:
         raise SimulationError(
@@ -295,9 +278,12 @@ def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> 
     if foot.is_flat:
         centres, radius = centres + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
     for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
-        body.add_geom(
+        geom = body.add_geom(
             name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1
         )
+        if foot.axis is not None:
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [radius, radius, _RIM_WIDTH]
+            mujoco.mju_quatZ2Vec(geom.quat, np.array(foot.axis))
 
 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:

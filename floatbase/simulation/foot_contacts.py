@@ -22,6 +22,7 @@ class FootContacts:
         # in a valley, a ball can touch two planes, and in the corner of a step two boxes
         self.max_contacts = len(self.geoms) * (n_planes + min(len(ground.boxes), 2))
         self._radii = model.geom_size[self.geoms, :1]
+        self._are_wheels = (model.geom_type[self.geoms] == mujoco.mjtGeom.mjGEOM_ELLIPSOID)[:, None]
         self._is_foot = np.isin(np.arange(model.ngeom), self.geoms)
         # one frame for each plane, which is a geom; known from its first contact on
         self._contact_frames = np.zeros((n_planes, 3, 3))
@@ -87,8 +88,11 @@ class FootContacts:
         np.add.at(forces, (rows, foot_geoms[rows, columns]), per_contact[rows, columns])
         return forces[:, self.geoms]
 
-    def positions(self, centres: Array) -> Array:
-        """Return the point of each ball nearest to the ground, in the world frame."""
+    def positions(self, centres: Array, rotations: Array) -> Array:
+        """Return the point of each ball or wheel nearest to the ground, in the world frame.
+
+        `centres`, shape (…, points, 3), and `rotations`, shape (…, points, 9), are those of geoms.
+        """
         distances = centres @ self._ground.normals.T - self._ground.offsets
         directions = self._ground.normals[np.argmin(distances, axis=-1)]
         if self._ground.boxes:
@@ -98,5 +102,12 @@ class FootContacts:
                 nearer = distance < least
                 least = np.where(nearer, distance, least)
                 directions = np.where(nearer[..., None], direction, directions)
+        if self._are_wheels.any():
+            axles = rotations[..., 2::3]  # the z axes
+            in_wheel = directions - (directions * axles).sum(-1, keepdims=True) * axles
+            length = np.linalg.norm(in_wheel, axis=-1, keepdims=True)
+            # a wheel that lies flat touches the ground everywhere
+            u = np.divide(in_wheel, length, out=np.zeros_like(in_wheel), where=length > 0.0)
+            directions = np.where(self._are_wheels, u, directions)
         positions: Array = centres - self._radii * directions
         return positions

@@ -189,13 +189,9 @@ class Ground(Value):
         edges = as_number("start", start, "m") + run * np.arange(n)
         # boxes that touch but do not overlap: coplanar contacts would count twice
         if rise > 0.0:
-            ends = np.append(edges, edges[-1] + _PLATFORM)
-            first = 1
-            floor = 0.0
+            ends, first, floor = np.append(edges, edges[-1] + _PLATFORM), 1, 0.0
         else:
-            ends = np.insert(edges, 0, edges[0] - _PLATFORM)
-            first = 0
-            floor = rise * n
+            ends, first, floor = np.insert(edges, 0, edges[0] - _PLATFORM), 0, rise * n
         side = np.array([-0.5 * width, 0.5 * width])
         boxes = [Box(ends[i : i + 2], side, rise * (first + i)) for i in range(n)]
         return cls(mu, offset=floor, boxes=boxes)
@@ -390,25 +386,13 @@ class Ground(Value):
 def box_distance(points: Array, bounds: Array) -> tuple[Array, Array]:
     """Return the distances of points from a box, and the directions in which they grow."""
     x0, x1, y0, y1, top = bounds
+    x, y, z = np.moveaxis(points, -1, 0)
     # how far a point lies outside each of the five faces, negative inside
-    faces = np.stack(
-        [
-            x0 - points[..., 0],
-            points[..., 0] - x1,
-            y0 - points[..., 1],
-            points[..., 1] - y1,
-            points[..., 2] - top,
-        ],
-        axis=-1,
-    )
+    faces = np.stack([x0 - x, x - x1, y0 - y, y - y1, z - top], axis=-1)
     outwards = np.maximum(faces, 0.0) @ _FACE_NORMALS
     outside = np.linalg.norm(outwards, axis=-1)
     nearest = faces.argmax(axis=-1)
     is_outside = outside > 0.0
     distances = np.where(is_outside, outside, faces.max(axis=-1))
-    directions = np.where(
-        is_outside[..., None],
-        outwards / np.where(is_outside, outside, 1.0)[..., None],
-        _FACE_NORMALS[nearest],
-    )
-    return distances, directions
+    unit = outwards / np.where(is_outside, outside, 1.0)[..., None]
+    return distances, np.where(is_outside[..., None], unit, _FACE_NORMALS[nearest])

@@ -5,6 +5,7 @@ After a fall, the robot lies on them.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from floatbase._validation import Array, read_only
 from floatbase.robots import Robot
-from floatbase.robots._shapes import link_shapes, shape_points, sphere_directions
+from floatbase.robots._shapes import link_shapes, placed_points, sphere_directions
 
 _MIN_THICKNESS = 1e-3  # m: MuJoCo builds no hull from flatter sets of points
 _BLOCK_SIZE = 1024  # points at a time: as many as one core's cache holds
@@ -27,16 +28,12 @@ def link_hulls(robot: Robot, folders: tuple[Path, ...]) -> tuple[tuple[int, Arra
     """
     if not robot.is_floating:
         return ()
-    clouds = dict[int, list[Array]]()
-    for item in link_shapes(robot.model, robot.urdf, folders)[0]:
-        points = (
-            shape_points(item.geometry) @ item.placement.rotation.T + item.placement.translation
-        )
-        clouds.setdefault(int(item.parentJoint), []).append(points)
-    hulls = {joint: np.vstack(cloud) for joint, cloud in clouds.items()}
+    clouds = defaultdict[int, list[Array]](list)
+    for shape in link_shapes(robot.model, robot.urdf, folders)[0]:
+        clouds[int(shape.parentJoint)].append(placed_points(shape))
     return tuple(
         (joint, read_only(_extreme_points(points)))
-        for joint, points in hulls.items()
+        for joint, points in zip(clouds, map(np.vstack, clouds.values()), strict=True)
         if _thickness(points) > _MIN_THICKNESS
     )
 

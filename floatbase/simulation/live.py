@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from types import EllipsisType
 from typing import Literal
 
@@ -140,9 +141,9 @@ class LiveSimulation:
             Called as listener(status) in the thread that changed the status. It replaces the
             previous listener; None removes it.
         """
-        self._listener = (
-            None if listener is None else as_callable("listener", listener, "listener(status)")
-        )
+        if listener is not None:
+            as_callable("listener", listener, "listener(status)")
+        self._listener = listener
 
     def start(self) -> None:
         """Run, or continue after a pause; a fallen robot is reset to standing first."""
@@ -204,11 +205,8 @@ class LiveSimulation:
         as_callable("the controller", controller, "controller(q, v, t)")
         if actuators is not ...:
             check_actuators(actuators)
-        period = (
-            self._period
-            if control_period is None
-            else as_positive("control_period", control_period, "s")
-        )
+        period = self._period if control_period is None else control_period
+        period = as_positive("control_period", period, "s")
         with self._lock:
             self._last_call, self._controller = time.monotonic(), controller
             if sim is not None and sim is not self.sim and self._status != "running":
@@ -265,19 +263,15 @@ class LiveSimulation:
                 self._requested_pushes.append(push)
             if self._stop.is_set():
                 self._stop = threading.Event()
-                args = (self._stop, self._thread)
-                self._thread = threading.Thread(
-                    target=self._loop, args=args, name="floatbase-live", daemon=True
-                )
+                loop = partial(self._loop, self._stop, self._thread)
+                self._thread = threading.Thread(target=loop, name="floatbase-live", daemon=True)
                 self._thread.start()
             changed = self._set_status("running")
         self._notify(changed)
 
     def _set_status(self, status: Status, reason: str = "") -> bool:
         """Set the status, and return whether it changed."""
-        previous = self._status
-        self._status = status
-        self._reason = reason
+        previous, self._status, self._reason = self._status, status, reason
         return previous != status
 
     def _notify(self, changed: bool) -> None:
@@ -376,12 +370,8 @@ class LiveSimulation:
     @property
     def _has_settled(self) -> bool:
         """Whether a robot with its controller off lies still, or its settling time is over."""
-        since = (
-            self.sim.time - (self._last_record.controller_off_time or 0.0)
-            if self._last_record is not None
-            else 0.0
-        )
-        return is_at_rest(self.sim) or since >= _MAX_SETTLING_TIME
+        off = None if self._last_record is None else self._last_record.controller_off_time
+        return is_at_rest(self.sim) or self.sim.time - (off or 0.0) >= _MAX_SETTLING_TIME
 
 
 def _slice_duration_for(period: float) -> float:

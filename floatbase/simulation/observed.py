@@ -234,12 +234,8 @@ class SensorNoise(Value):
             The scaled noise with the same seed.
         """
         factor = as_positive("factor", factor, allow_zero=True)
-        deviations = {
-            deviation.name: factor * getattr(self, deviation.name)
-            for deviation in fields(self)
-            if deviation.kw_only
-        }
-        return replace(self, **deviations)
+        names = [deviation.name for deviation in fields(self) if deviation.kw_only]
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
 
     def __call__(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         """Return the measured state.

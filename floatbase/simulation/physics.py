@@ -50,10 +50,10 @@ class Simulation:
     """A robot on the ground in MuJoCo, driven by joint torques.
 
     MuJoCo reads the robot's own URDF. A floating base gets a free joint, each point foot one ball,
-    and each flat foot a ball at each corner. Each joint gets a torque motor with the robot's torque
-    limit and rotor inertia. Joint friction and joint damping are off, as in eqs. (1)-(7), except
-    with `joint_losses`. The joint limits of the URDF are on. Only the feet collide with the ground;
-    after a fall the links can collide with it, too (`link_collisions`).
+    each wheel a thin disc, and each flat foot a ball at each corner. Each joint gets a torque motor
+    with the robot's torque limit and rotor inertia. Joint friction and joint damping are off, as in
+    eqs. (1)-(7), except with `joint_losses`. The joint limits of the URDF are on. Only the feet
+    collide with the ground; after a fall the links can collide with it, too (`link_collisions`).
 
     Constructor arguments cannot be changed later, but the contents of `model` and `data` can. A
     copy has its own `model` and `data`.
@@ -114,9 +114,8 @@ class Simulation:
             [self.model.actuator(name).id for name in robot.joint_names], dtype=int
         )
         self._foot_contacts = FootContacts(self.model, self.ground, self.point_names)
-        self._planes = list(
-            zip(self.ground.normals.tolist(), self.ground.offsets.tolist(), strict=True)
-        )
+        normals, offsets = self.ground.normals.tolist(), self.ground.offsets.tolist()
+        self._planes = list(zip(normals, offsets, strict=True))
         # the hulls are the only meshes; a body that has a foot can always touch
         self._hull_geoms = np.flatnonzero(self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
         self._hull_bodies = np.setdiff1d(
@@ -233,10 +232,8 @@ class Simulation:
         """Whether a floating base lost 60 % of its height or tilted by 60° since the last reset."""
         if not self.robot.is_floating:
             return False
-        sunk = (
-            self._start_height - self._base_height()
-            > (1.0 - FALLEN_HEIGHT_FRACTION) * self._nominal_height
-        )
+        largest_drop = (1.0 - FALLEN_HEIGHT_FRACTION) * self._nominal_height
+        sunk = self._start_height - self._base_height() > largest_drop
         return sunk or _dot(self._base_vertical.tolist(), self._start_vertical) < FALLEN_COSINE
 
     @property
@@ -297,9 +294,8 @@ class Simulation:
             mujoco.mj_forward(self.model, self.data)
         self._start_height = self._nominal_height = self._base_height()
         self._start_vertical = self._base_vertical.tolist()
-        if (
-            self._nominal_height <= _MIN_INITIAL_HEIGHT
-        ):  # it lies on the ground: measure a fall by the distance to the centre of mass
+        if self._nominal_height <= _MIN_INITIAL_HEIGHT:
+            # it lies on the ground: measure a fall by the distance to the centre of mass
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
 
     @contextmanager
@@ -442,7 +438,8 @@ class Simulation:
         ndarray, shape (points, 3)
             Position of each point of `point_names`, in the world frame [m].
         """
-        return self.foot_contacts.positions(self.data.geom_xpos[self.foot_contacts.geoms])
+        geoms = self.foot_contacts.geoms
+        return self.foot_contacts.positions(self.data.geom_xpos[geoms], self.data.geom_xmat[geoms])
 
     def pushed_body(self, push: Push) -> int:
         """Return MuJoCo's id of the body that a push acts on.
@@ -468,14 +465,11 @@ class Simulation:
             return int(self.model.joint(joint).bodyid[0])
         if self.robot.is_floating:
             return self._base_body
-        moving = ", ".join(
-            f.name
-            for f in self.robot.model.frames
-            if f.parentJoint > 0 and f.type == pin.FrameType.BODY
-        )
+        links = [f for f in self.robot.model.frames if f.type == pin.FrameType.BODY]
         raise InputError(
             f"A push at {push.frame!r} has no effect, because {self.robot.name} is fixed to the "
-            f"ground there. Push a link that moves: {moving}."
+            f"ground there. Push a link that moves: "
+            f"{', '.join(link.name for link in links if link.parentJoint > 0)}."
         )
 
     def page_data(self) -> dict[str, Any]:

@@ -135,16 +135,11 @@ def as_pushes(pushes: Sequence[Push]) -> tuple[Push, ...]:
         raise InputError(
             f"pushes must be a list, as in pushes=[fb.Push(…)], not {short_repr(pushes)}."
         )
-    return tuple(
-        as_instance("each of the pushes", push, Push, "fb.Push([0.0, 30.0, 0.0])")
-        for push in pushes
-    )
+    example = "fb.Push([0.0, 30.0, 0.0])"
+    return tuple(as_instance("each of the pushes", push, Push, example) for push in pushes)
 
 
 def active_pushes(pushes: tuple[Push, ...], begin: float, end: float) -> tuple[Push, ...]:
     """Return the pushes that act at any time from `begin` to `end` [s]."""
-    return tuple(
-        p
-        for p in pushes
-        if p.start < end - _CLOCK_TOLERANCE and begin < p.start + p.duration - _CLOCK_TOLERANCE
-    )
+    begin, end = begin + _CLOCK_TOLERANCE, end - _CLOCK_TOLERANCE
+    return tuple(p for p in pushes if p.start < end and begin < p.start + p.duration)

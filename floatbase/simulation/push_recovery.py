@@ -103,12 +103,8 @@ class PushRecovery(Value):
         weight_wrench = np.array([0.0, 0.0, wrenches.weight, 0.0, 0.0, 0.0])
         if not wrenches.contains(weight_wrench):
             return read_only(np.zeros(len(self.directions)))
-        return read_only(
-            [
-                _max_scaling(wrenches, -np.concatenate([d, np.cross(lever, d)]), weight_wrench)
-                for d in self.unit_vectors
-            ]
-        )
+        pushes = [-np.concatenate([d, np.cross(lever, d)]) for d in self.unit_vectors]
+        return read_only([_max_scaling(wrenches, push, weight_wrench) for push in pushes])
 
     @cached_property
     def capture_point_bound(self) -> Array:
@@ -134,11 +130,10 @@ class PushRecovery(Value):
         return read_only(distance * robot.mass * omega**2 / -np.expm1(-omega * self.duration))
 
     def __repr__(self) -> str:
-        span = f"{self.pushes.min():g} to {self.pushes.max():g} N for {self.duration:g} s"
-        count = f"{len(self.directions)} directions"
         return (
-            f"PushRecovery({self.state.robot.name}, {count}, {span}, in steps of "
-            f"{self.resolution:g} N)"
+            f"PushRecovery({self.state.robot.name}, {len(self.directions)} directions, "
+            f"{self.pushes.min():g} to {self.pushes.max():g} N for {self.duration:g} s, in steps "
+            f"of {self.resolution:g} N)"
         )
 
 
@@ -221,10 +216,8 @@ def push_recovery(
         "observation_time": as_positive("observation_time", observation_time, "s"),
         "resolution": as_positive("resolution", resolution, "N"),
     }
-    first = ceil(
-        as_positive("initial_force", robot.weight if initial_force is None else initial_force, "N")
-        / resolution
-    )
+    initial_force = robot.weight if initial_force is None else initial_force
+    first = ceil(as_positive("initial_force", initial_force, "N") / resolution)
 
     def largest_push(direction: float) -> float:  # the progress bar shows this name
         return _largest_survived(direction, make, frame, first, **settings)
@@ -258,9 +251,8 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
         return partial(_simulation_and_controller, controller)
     cloudpickle = require("cloudpickle", "sweep")
     try:
-        return partial(
-            _simulation_and_controller, partial(pickle.loads, cloudpickle.dumps(controller))
-        )
+        copy = partial(pickle.loads, cloudpickle.dumps(controller))
+        return partial(_simulation_and_controller, copy)
     except Exception as error:
         raise InputError(
             f"This controller cannot be copied for each push ({type(error).__name__}: {error}). "
@@ -298,9 +290,8 @@ def _largest_survived(
 
     def pushed(steps: int) -> Rollout:
         sim, controller = make()
-        push = Push(
-            steps * resolution * _unit_vectors(direction), sim.time + start, duration, frame
-        )
+        force = steps * resolution * _unit_vectors(direction)
+        push = Push(force, sim.time + start, duration, frame)
         ticks = ceil((start + duration + observation_time) / sim.timestep)
         return rollout(sim, controller, ticks * sim.timestep, [push])
 
@@ -319,12 +310,9 @@ def _largest_survived(
         middle = (survived + fatal) // 2
         survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
     if survived == 0 and (unpushed := pushed(0)).outcome != "completed":
-        reason = f"The controller fails without a push: {unpushed.error}"
-        raise SimulationError(
-            "The robot falls without a push. Give a controller that stands."
-            if unpushed.error is None
-            else reason
-        )
+        if unpushed.error is None:
+            raise SimulationError("The robot falls without a push. Give a controller that stands.")
+        raise SimulationError(f"The controller fails without a push: {unpushed.error}")
     return survived * resolution
 
 
@@ -357,9 +345,5 @@ def _distance_to_border(polygon: Array, point: Array, directions: Array) -> Arra
     if np.any(slack < 0.0):
         return np.zeros(len(directions))
     cosines = directions @ normals.T
-    return np.asarray(
-        np.min(
-            np.where(cosines > _MIN_COSINE, slack / np.maximum(cosines, _MIN_COSINE), np.inf),
-            axis=1,
-        )
-    )
+    distances = slack / np.maximum(cosines, _MIN_COSINE)
+    return np.asarray(np.where(cosines > _MIN_COSINE, distances, np.inf).min(axis=1))

@@ -191,8 +191,8 @@ class Rollout(Value):
         Parameters
         ----------
         include_rolling : bool, optional
-            Whether to count the distance that a ball rolls, too: rolling moves its lowest point
-            without any sliding.
+            Whether to count the distance that a ball or a wheel rolls, too: rolling moves its
+            lowest point without any sliding.
 
         Returns
         -------
@@ -200,18 +200,15 @@ class Rollout(Value):
             Largest distance of each point in any of its stances [m].
         """
         self._check_not_empty()
-        positions = (
-            self.foot_positions
-            if as_bool("include_rolling", include_rolling)
-            else self.foot_positions - self.rolling_displacement()
-        )
+        positions = self.foot_positions
+        if not as_bool("include_rolling", include_rolling):
+            positions = positions - self.rolling_displacement()
         max_distance, first = np.zeros(positions.shape[1]), 0
         for contact in self.contacts.friction_contacts:
             points = slice(first, first := first + len(contact.point_names))
             for begin, end in self._stance_intervals(contact.name):
-                distance = np.linalg.norm(
-                    positions[begin:end, points] - positions[begin, points], axis=2
-                ).max(axis=0)
+                moved = positions[begin:end, points] - positions[begin, points]
+                distance = np.linalg.norm(moved, axis=2).max(axis=0)
                 max_distance[points] = np.maximum(max_distance[points], distance)
         return read_only(max_distance)
 
@@ -225,30 +222,27 @@ class Rollout(Value):
         return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
     def rolling_displacement(self) -> Array:
-        """Compute how far the ball at each contact point has rolled.
+        """Compute how far the ball or the wheel at each contact point has rolled.
 
-        The displacement is the integral of ω × radius · normal.
+        The displacement is the integral of `rolling_velocity` of the contact.
 
         Returns
         -------
         ndarray, shape (n, points, 3)
             Displacement in the world frame since the first row [m].
         """
-        arms = [
-            (contact.name, getattr(contact, "radius", 0.0) * contact.normal)
+        rolling = [
+            getattr(contact, "radius", 0.0) > 0.0 and getattr(contact, "rolling_velocity", None)
             for contact in self.contacts.friction_contacts
             for _ in contact.point_names
         ]
-        rates = np.zeros((len(self), len(arms), 3))
-        if any(np.any(arm) for _, arm in arms):
+        rates = np.zeros((len(self), len(rolling), 3))
+        if any(rolling):
             for rate, q, v in zip(rates, self.q, self.v, strict=True):
                 state = State(self.robot, q, v)
-                rate[:] = [
-                    np.cross(state.frame_velocity(name)[3:], arm) if np.any(arm) else np.zeros(3)
-                    for name, arm in arms
-                ]
+                rate[:] = [velocity(state) if velocity else np.zeros(3) for velocity in rolling]
         steps = np.diff(self.time)[:, None, None] * (rates[1:] + rates[:-1]) / 2.0
-        return np.concatenate([np.zeros((1, len(arms), 3)), np.cumsum(steps, axis=0)])
+        return np.concatenate([np.zeros((1, len(rolling), 3)), np.cumsum(steps, axis=0)])
 
     def _check_not_empty(self) -> None:
         """Raise `InputError` if the record has no rows."""
@@ -283,7 +277,9 @@ class Recorder:
         self._joint_limits: JointLimits | None = None
         # values in MuJoCo's convention, which `to_rollout` converts for all rows at once
         self._geom_positions, self._actuator_forces = sim.data.geom_xpos, sim.data.actuator_force
+        self._geom_rotations = sim.data.geom_xmat
         self._foot_centres, self._n_steps = np.empty((ticks, points, 3)), 0
+        self._foot_rotations = np.empty((ticks, points, 9))
         self._step_actuator_forces = np.empty((ticks * substeps, sim.model.nu))
         max_contacts = sim.foot_contacts.max_contacts
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
@@ -308,18 +304,16 @@ class Recorder:
         self._time[n], self._q[n], self._v[n] = t, q, v
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
+        self._geom_rotations.take(geoms, 0, self._foot_rotations[n], "clip")
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
         i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
         missing = len(geoms) - self._step_contact_geoms.shape[1]
         if missing > 0:  # a foot touches many boxes
-            self._step_contact_geoms = np.pad(
-                self._step_contact_geoms, ((0, 0), (0, missing), (0, 0))
-            )
-            self._step_contact_forces = np.pad(
-                self._step_contact_forces, ((0, 0), (0, 3 * missing))
-            )
+            more_geoms, more_forces = ((0, 0), (0, missing), (0, 0)), ((0, 0), (0, 3 * missing))
+            self._step_contact_geoms = np.pad(self._step_contact_geoms, more_geoms)
+            self._step_contact_forces = np.pad(self._step_contact_forces, more_forces)
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)] = geoms
         self._step_contact_forces[i, : forces.size] = forces
@@ -398,22 +392,14 @@ class Recorder:
 
     def _targets_by_name(self) -> dict[str, Array]:
         """Return the targets of each task, shape (n, m), with NaN in rows without that task."""
-        rows_of: dict[int, list[int]] = {}
-        for i, (_, _, entries) in enumerate(self._targets):
-            rows_of.setdefault(id(entries), []).append(i)
-        targets: dict[str, Array] = {}
-        for indices in rows_of.values():
-            rows = [self._targets[i][0] for i in indices]
-            values = np.array([self._targets[i][1] for i in indices])
-            for name, part in self._targets[indices[0]][2].items():
-                width = part.stop - part.start
-                if name not in targets or targets[name].shape[1] < width:
-                    grown = np.full((self._n, width), np.nan)
-                    grown[:, : targets[name].shape[1] if name in targets else 0] = targets.get(
-                        name, grown[:, :0]
-                    )
-                    targets[name] = grown
-                targets[name][rows, :width] = values[:, part]
+        widths: dict[str, int] = {}
+        for entries in {id(entries): entries for _, _, entries in self._targets}.values():
+            for name, part in entries.items():
+                widths[name] = max(part.stop - part.start, widths.get(name, 0))
+        targets = {name: np.full((self._n, width), np.nan) for name, width in widths.items()}
+        for row, values, entries in self._targets:
+            for name, part in entries.items():
+                targets[name][row, : part.stop - part.start] = values[part]
         return {name: frozen(array) for name, array in targets.items()}
 
     def _complete_rows(self, rows: Array) -> Array:
@@ -423,10 +409,8 @@ class Recorder:
     def _mean_over_substeps(self, steps: Array) -> Array:
         """Return the mean over the timesteps of each row, shape (n, ...)."""
         if self._substeps > 1:
-            steps = (
-                steps.reshape(self._n, self._substeps, *steps.shape[1:]).sum(axis=1)
-                / self._substeps
-            )
+            of_each_tick = steps.reshape(self._n, self._substeps, *steps.shape[1:])
+            steps = of_each_tick.sum(axis=1) / self._substeps
         return read_only(steps)
 
     def _planned_at(self, contacts: Contacts) -> Array:
@@ -436,9 +420,8 @@ class Recorder:
         for i in self._rows_with_plan:
             rows[self._stances[i]].append(i)
         for stance, stance_rows in rows.items():
-            entries = [
-                i for name in stance.names for i in entries_of_all[contacts.force_slice(name)]
-            ]
+            parts = [entries_of_all[contacts.force_slice(name)] for name in stance.names]
+            entries = np.concatenate([entries_of_all[:0], *parts]).tolist()
             forces[stance_rows] = 0.0
             forces[np.ix_(stance_rows, entries)] = self._planned_forces[stance_rows, : stance.k]
         return read_only(forces)
@@ -449,14 +432,12 @@ class Recorder:
         A point contact in the middle of a flat foot has the sum of the corners' forces and the mean
         of their positions.
         """
-        sim = self._sim
-        n = self._n
-        feet = self._sim.feet
+        sim, n, feet = self._sim, self._n, self._sim.feet
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
             sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
         )
-        lowest = sim.foot_contacts.positions(self._foot_centres[:n])
+        lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
@@ -472,6 +453,8 @@ class Recorder:
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)
             all_positions.append(positions)
-        return read_only(np.concatenate(all_forces, axis=1)), read_only(
-            np.concatenate(all_positions, axis=1)
+        forces, positions = (
+            np.concatenate(all_forces, axis=1),
+            np.concatenate(all_positions, axis=1),
         )
+        return read_only(forces), read_only(positions)

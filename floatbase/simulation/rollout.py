@@ -204,10 +204,8 @@ def _period_count(name: str, time: float, unit: str, period: float, minimum: int
     """
     time = as_positive(name, time, "s", allow_zero=minimum == 0)
     count = round(time / period)
-    if (
-        count < minimum
-        or abs(count * period - time) > _PERIOD_TOLERANCE * period + _TIME_TOLERANCE * time
-    ):
+    tolerance = _PERIOD_TOLERANCE * period + _TIME_TOLERANCE * time
+    if count < minimum or abs(count * period - time) > tolerance:
         near = max(count, 1) * period
         raise InputError(
             f"{name} is {time:g} s; it must be a whole multiple of {unit}, {period:g} s, such as "
@@ -220,21 +218,17 @@ def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -
     """Return a warning if there are pushes and none acts from `begin` to `end` [s], else ""."""
     if not pushes or active_pushes(pushes, begin, end):
         return ""
-    first = pushes[0]
-    what = (
-        f"None of the {len(pushes)} pushes acts during this rollout. The first one"
-        if len(pushes) > 1
-        else "The push does not act during this rollout. It"
-    )
+    first, what = pushes[0], "The push does not act during this rollout. It"
+    if len(pushes) > 1:
+        what = f"None of the {len(pushes)} pushes acts during this rollout. The first one"
     if first.start < begin:
         advice = f"Call sim.reset() to restart the clock, or use start=sim.time + {first.start:g}"
     else:
         advice = f"Use a duration of more than {first.start - begin:g} s"
-    span = (
-        f"acts from {first.start:g} to {first.start + first.duration:g} s, but the rollout goes "
-        f"from {begin:g} to {end:g} s"
+    return (
+        f"{what} acts from {first.start:g} to {first.start + first.duration:g} s, but the rollout "
+        f"goes from {begin:g} to {end:g} s. {advice}."
     )
-    return f"{what} {span}. {advice}."
 
 
 def _check_arguments(
@@ -300,11 +294,8 @@ def _run_substeps(
     tau = desired
     for _ in range(substeps):
         if actuators is not None:
-            tau = _as_torques(
-                sim,
-                "The actuators' torques",
-                actuators.step(desired, *sim.joint_state, sim.timestep),
-            )
+            tau = actuators.step(desired, *sim.joint_state, sim.timestep)
+            tau = _as_torques(sim, "The actuators' torques", tau)
         sim.advance(tau, pushes)
         record.after_step()
 
@@ -372,9 +363,9 @@ def _targets(command: Any) -> tuple[Array, Mapping[str, slice]] | None:
     """Return a command's targets and the entries of each task, or None if it has none."""
     values = getattr(command, "target_values", None)
     entries = getattr(command, "target_entries", None)
-    return (
-        (values, entries) if type(values) is np.ndarray and isinstance(entries, Mapping) else None
-    )
+    if type(values) is np.ndarray and isinstance(entries, Mapping):
+        return values, entries
+    return None
 
 
 def _planned_accelerations(sim: Simulation, command: Any) -> Array | None:

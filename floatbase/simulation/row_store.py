@@ -51,11 +51,8 @@ def as_frame(rows: Mapping[int, Row]) -> DataFrame:
     """Return rows, as point number -> row, as a `pandas.DataFrame` that ends in "error"."""
     pandas, points = require("pandas", "sweep"), sorted(rows)
     names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
-    return pandas.DataFrame(
-        [rows[i] for i in points],
-        index=pandas.Index(points, name="point"),
-        columns=[*names, "error"],
-    )
+    index = pandas.Index(points, name="point")
+    return pandas.DataFrame([rows[i] for i in points], index, [*names, "error"])
 
 
 class RowStore:
@@ -105,15 +102,11 @@ class RowStore:
             self._write(header)
             return
         found = _read_header(path, content)
-        for key, what in (
-            ("sweep", "the function"),
-            ("parameters", "the parameters"),
-            ("points", "the number of points"),
-        ):
-            if found[key] != header[key]:
-                raise _wrong_file_error(
-                    path, f"with {what} {_joined(found[key])}, not {_joined(header[key])}"
-                )
+        labels = {"sweep": "function", "parameters": "parameters", "points": "number of points"}
+        for key, what in labels.items():
+            if (there := found[key]) != header[key]:
+                what = f"with the {what} {_joined(there)}, not {_joined(header[key])}"
+                raise _wrong_file_error(path, what)
         if found["grid"] != header["grid"]:
             raise _wrong_file_error(path, "with the same parameters but different values")
         self.rows = _read_rows(path, complete_lines)

@@ -134,16 +134,9 @@ def sweep(
         done = {i for i, row in store.rows.items() if row["error"] is None}
         pending = [(i, point) for i, point in enumerate(points) if i not in done]
         with closing(_answers(executor, job, pending)) as answers:
-            bar = require("tqdm.auto", "sweep").tqdm(
-                answers,
-                total=len(points),
-                initial=len(done),
-                desc=name,
-                unit="point",
-                disable=not as_bool("progress", progress),
-            )
-            failed = 0
-            with bar:
+            failed, tqdm = 0, require("tqdm.auto", "sweep").tqdm
+            counts = {"total": len(points), "initial": len(done), "unit": "point"}
+            with tqdm(answers, name, disable=not as_bool("progress", progress), **counts) as bar:
                 for i, answer in bar:
                     if isinstance(answer, _Failure):
                         raise answer.exception()

@@ -120,50 +120,6 @@ def test_the_spool_chooses_which_chamber_is_fed(x, into):
 # oil
 
 
-def test_a_blocked_piston_comes_to_rest_where_valve_and_leakage_pass_the_same_flow():
-    """Both edges and the gap in a row: K x √(p_s - p_A) = c (p_A - p_B) = K x √(p_B - p_t)."""
-    leaky = replace(HYQ, leakage=5e-12)
-    cylinder, x = one(leaky), np.array([0.3])
-    geometry, still = cylinder.geometry([0.0]), np.zeros(1)
-
-    def rates(t: float, p: np.ndarray) -> np.ndarray:
-        return cylinder.pressure_rates(x, p.reshape(2, 1), geometry, still).ravel()
-
-    end = solve_ivp(rates, (0.0, 2.0), [50e5, 50e5], method="LSODA", rtol=1e-9, atol=1.0).y[:, -1]
-    # equal drops s² at both edges: K x s = c (p_s - p_t - 2 s²)
-    a, b = 2.0 * leaky.leakage, leaky.valve_gain * 0.3
-    s = (
-        -b + np.sqrt(b**2 + 4.0 * a * leaky.leakage * (leaky.supply_pressure - leaky.tank_pressure))
-    ) / (2.0 * a)
-    expected = [leaky.supply_pressure - s**2, leaky.tank_pressure + s**2]
-    assert end == pytest.approx(expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("q", [-0.8, 0.0, 0.5])
-def test_closed_chambers_are_a_spring_of_the_textbooks_frequency(q):
-    """√(β (A_A²/V_A + A_B²/V_B) / m): a mass on the rod, valve shut, timed over 20 swings."""
-    cylinder, mass = one(replace(HYQ, leakage=0.0)), 60.0
-    geometry = cylinder.geometry([q])
-    volume, area = geometry.volumes[:, 0], HYQ.areas
-    expected = np.sqrt(
-        HYQ.bulk_modulus * (area[0] ** 2 / volume[0] + area[1] ** 2 / volume[1]) / mass
-    )
-    balanced = np.array([60e5, 60e5 * area[0] / area[1]])
-
-    def motion(t: float, y: np.ndarray) -> np.ndarray:
-        p, speed = y[:2].reshape(2, 1), y[2:]
-        rates = cylinder.pressure_rates(np.zeros(1), p, geometry, speed / geometry.lever)
-        return np.concatenate([rates.ravel(), cylinder.force(p) / mass])
-
-    time = np.linspace(0.0, 20.0 * 2.0 * np.pi / expected, 20001)
-    speed = solve_ivp(
-        motion, (0.0, time[-1]), [*balanced, 1e-3], t_eval=time, rtol=1e-9, atol=1e-9
-    ).y[2]
-    rising = np.flatnonzero((speed[:-1] < 0.0) & (speed[1:] >= 0.0))
-    frequency = 2.0 * np.pi * (rising.size - 1) / (time[rising[-1]] - time[rising[0]])
-    assert frequency == pytest.approx(expected, rel=1e-3)
-
-
 # power
 
 
@@ -274,21 +230,6 @@ def test_the_bandwidth_sets_the_speed_of_a_torque_step_which_ends_exactly(bandwi
     assert np.allclose(part[-1], 1.0, atol=1e-3)
 
 
-@pytest.mark.parametrize("bandwidth", [10.0, 50.0, 150.0])
-def test_a_sine_at_the_bandwidth_keeps_0_7_of_its_size_and_a_much_faster_one_does_not(bandwidth):
-    def gain(frequency: float) -> float:
-        actuators = joints(replace(HYQ, loop_bandwidth=bandwidth))
-        dt, n = 1.0 / (200.0 * frequency), 200
-        wave = np.sin(2.0 * np.pi * np.arange(6 * n) / n)
-        amplitude = 0.02 * judges.load("go2").torque_limits
-        q, still = actuators.cylinders.max_lever_angle, np.zeros(12)
-        out = np.array([actuators.step(s * amplitude, q, still, dt) for s in wave])[-n:] / amplitude
-        return float(np.ptp(out[:, 0]) / 2.0)
-
-    assert 1.0 / np.sqrt(2.0) <= gain(bandwidth) < 1.25
-    assert gain(8.0 * bandwidth) < 0.2
-
-
 def test_leakage_leaves_no_error_behind():
     """A seal ten times worse takes a tenth off the torque at first; the integral finds the opening
     that makes up for it.
@@ -299,25 +240,6 @@ def test_leakage_leaves_no_error_behind():
     assert np.all(np.abs(part[20] - 1.0) > 0.1)
     assert np.allclose(part[-1], 1.0, atol=1e-6)
     assert np.all(actuators.state.opening < 0.0)
-
-
-def test_a_joint_that_is_swung_keeps_its_torque_because_velocity_is_fed_forward():
-    """±0.3 rad at 2 Hz, 3.8 rad/s: within 6 % of the torque limit; a spring of oil alone would give
-    100 times that.
-    """
-    actuators, limits = joints(), judges.load("go2").torque_limits
-    best, tau = actuators.cylinders.max_lever_angle, 0.3 * limits
-    run(actuators, tau, 0.2)
-    worst, dt = np.zeros(12), 1e-3
-    for i in range(1000):
-        phase, ramp = 4.0 * np.pi * i * dt, min(1.0, i / 100.0)  # set off gently
-        q = best + ramp * 0.3 * np.sin(phase)
-        v = np.full(12, ramp * 0.3 * 4.0 * np.pi * np.cos(phase))
-        worst = np.maximum(worst, np.abs(actuators.step(tau, q, v, dt) - tau) / limits)
-    stiffness = actuators.cylinders.geometry(best).stiffness
-    spring = 0.3 * actuators.cylinders.crank**2 * stiffness / limits
-    assert np.max(worst) < 0.06
-    assert np.min(spring / worst) > 100.0
 
 
 # strength

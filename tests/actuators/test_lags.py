@@ -69,15 +69,6 @@ def test_a_lags_step_response_is_its_closed_form(bandwidth):
     assert np.allclose(answer.T, closed, atol=12.0 * ROUNDING)
 
 
-def test_a_lag_takes_three_decibels_and_45_degrees_off_a_sine_of_its_bandwidth():
-    dt = 1e-4
-    phase = 2.0 * np.pi * 3.0 * dt * np.arange(20_000)  # 6 periods of 3 Hz
-    answer = got(FirstOrderLag(ROBOT, 3.0), np.sin(phase)[:, None] * np.ones(12), dt)[-10_000:, 0]
-    spectrum = 2.0 * np.mean(answer * np.exp(-1j * phase[-10_000:])) * 1j
-    assert abs(spectrum) == pytest.approx(np.sqrt(0.5), abs=2e-3)  # half a step is 0.05°
-    assert np.degrees(np.angle(spectrum)) == pytest.approx(-45.0, abs=0.2)
-
-
 # both
 
 

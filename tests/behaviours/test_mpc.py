@@ -9,13 +9,12 @@ import cvxpy as cp
 import judges
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 import pytest
 from messages import raises, refused
 from scipy.linalg import expm
 
 import floatbase as fb
-from floatbase.behaviours import MPC, STATE_WEIGHTS, Gains, Gait, HorizonMotion, HorizonQP, Walk
+from floatbase.behaviours import MPC, Gains, Gait, HorizonMotion, HorizonQP, Walk
 from floatbase.control import Command
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
@@ -108,24 +107,6 @@ def test_the_states_are_those_of_the_matrix_exponential(seed):
         assert np.allclose(motion.states[k], x, atol=1e-9)
 
 
-def test_a_flight_follows_the_closed_form():
-    horizon, (x, reference, feet, stance) = random_problem(0)
-    motion = horizon.solve(x, reference, feet, np.zeros_like(stance))
-    assert not motion.forces.any()
-    t = horizon.dt * np.arange(1, len(reference) + 1)[:, None]
-    g = np.array([0.0, 0.0, horizon.gravity])
-    assert np.allclose(motion.states[:, 3:6], x[3:6] + x[9:12] * t - g * t**2 / 2.0)
-    assert np.allclose(motion.states[:, 9:12], x[9:12] - g * t)
-    assert np.allclose(motion.states[:, 6:9], x[6:9])
-
-
-def test_four_feet_share_the_weight():
-    horizon = HorizonQP(mass=10.0, inertia=0.1 * np.eye(3), force_weight=1e-6)
-    feet = np.tile([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)], (8, 1, 1))
-    motion = horizon.solve(np.zeros(12), np.zeros((8, 12)), feet, np.ones((8, 4), dtype=bool))
-    assert np.allclose(motion.forces, [0.0, 0.0, horizon.mass * horizon.gravity / 4.0], atol=0.05)
-
-
 def test_a_horizon_checks_its_arguments():
     horizon, (x, reference, feet, stance) = random_problem(0)
     good = {"mass": 1.0, "inertia": np.eye(3)}
@@ -191,37 +172,6 @@ def test_a_flying_trot_reaches_its_speed_on_the_compiled_backend(flying):
     assert 90 < len(observed.motions) < 150
 
 
-def test_in_flight_momentum_follows_the_closed_form(flying):
-    run, _ = flying
-    robot, data = run.robot, run.robot.model.createData()
-    untouched = [
-        len(run.contacts_at(i)) == 0 and not run.measured[i].any() for i in range(len(run))
-    ]
-    first = next(i for i in range(len(run)) if run.time[i] > 1.0 and untouched[i])
-    indices = range(first, first + untouched[first:].index(False))
-    assert len(indices) >= 5
-    momenta = np.array(
-        [
-            pin.computeCentroidalMomentum(robot.model, data, run.q[i], run.v[i]).vector.copy()
-            for i in indices
-        ]
-    )
-    t = run.time[indices] - run.time[first]
-    scale = 1e-3 * robot.mass  # 1 mm/s
-    assert np.allclose(momenta[:, 2] - momenta[0, 2], -robot.weight * t, atol=scale)
-    assert np.allclose(momenta[:, [0, 1, 3, 4, 5]], momenta[0, [0, 1, 3, 4, 5]], atol=scale)
-
-
-def test_predictions_of_90_ms_agree_with_mujoco(flying):
-    run, observed = flying
-    errors = []
-    for t, motion in observed.motions.items():
-        i = round((t + 0.09) / PERIOD)
-        if t > 0.8 and i < len(run):
-            errors.append(motion.states[2, 3:6] - run.com[i])
-    assert np.abs(errors).max() < 0.005  # m; the body moves 45 mm forwards meanwhile
-
-
 @pytest.mark.parametrize("name", ["solo12", "anymal_kinova"])
 def test_other_robots_pronk_with_the_same_numbers(name):
     run, _ = walked(name, Gait.pronk(judges.load(name), 0.2, 0.2, start=0.2), 0.2, 1.6)
@@ -249,13 +199,6 @@ def test_the_corners_of_the_horizons_pyramid_are_inside_the_controllers_polyhedr
     assert np.hypot(mu, mu) <= 0.6 + 1e-12  # inside the cone
 
 
-def test_forces_of_the_horizon_are_inside_the_cone_with_eight_facets():
-    gait = Gait.trot(judges.load("go2"), swing=0.15, start=0.1)
-    _, observed = walked("go2", gait, 1.5, 1.2, facets=8)
-    forces = np.concatenate([motion.forces.reshape(-1, 3) for motion in observed.motions.values()])
-    assert np.all(np.hypot(*forces.T[:2]) <= 0.6 * forces[:, 2] + 1e-6)
-
-
 def test_the_force_task_follows_the_gains():
     robot = judges.load("go2")
     contacts, gait = fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.1)
@@ -274,20 +217,6 @@ def test_the_force_task_follows_the_gains():
     assert np.all(one >= 0.02 * 10.0 / robot.mass**2)
     with raises(InputError, "gains"):
         MPC(robot, contacts, gait, gains=3.0)
-
-
-@pytest.mark.front_end
-def test_a_bound_with_flight_works_with_small_weights_on_pitch():
-    offsets = {"FL_foot": 0.0, "FR_foot": 0.0, "RL_foot": 0.5, "RR_foot": 0.5}
-    weights = np.array(STATE_WEIGHTS)
-    weights[[1, 7]] *= 0.1
-    gait = Gait(offsets, period=0.24, swing=0.14, start=0.2)
-    run, _ = walked("go2", gait, 0.5, 3.0, state_weights=weights)
-    assert run.outcome == "completed"
-    flights = [i for i in range(len(run)) if len(run.contacts_at(i)) == 0]
-    assert len(flights) > 0.1 * len(run)
-    tilt = np.arccos(1.0 - 2.0 * (run.q[:, 3] ** 2 + run.q[:, 4] ** 2))
-    assert np.rad2deg(tilt.max()) < 15.0
 
 
 def test_copies_and_restarts_give_the_same_torques():

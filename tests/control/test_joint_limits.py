@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cvxpy as cp
 import judges
 import numpy as np
 import pinocchio as pin
@@ -108,79 +107,6 @@ def test_both_backends_agree_near_limits(name, weight):
         assert max(residuals.inequality, residuals.dual) < 1e-6
     assert n_active > 0
     assert weight is not None or n_violated == 0
-
-
-def accelerations_within(limits: JointLimits, q: float, v: float, j: int) -> tuple[float, float]:
-    """Return bounds of one joint's acceleration, found by bisection on what happens afterwards."""
-    dt, brake = limits.period, limits.braking[j]
-
-    def stays(qdd: float, side: float) -> bool:
-        """Whether the joint stays below its limit on this side if it brakes after one period."""
-        limit = limits.upper[j] if side > 0.0 else -limits.lower[j]
-        x, speed, a = side * q, side * v, side * qdd
-        during = x + speed * dt + 0.5 * a * dt**2
-        if a < 0.0 < speed < -a * dt and x < limit:  # turns within the period
-            during = max(during, x - speed**2 / (2.0 * a))
-        after = speed + a * dt
-        margin = max(after, 0.0) ** 2 / (2.0 * brake)
-        return bool(max(during, x + speed * dt + 0.5 * a * dt**2 + margin) <= limit)
-
-    bounds = []
-    for side in (-1.0, 1.0):
-        worst, best = 1e5 * side, -2.0 * brake * side
-        if stays(best, side):
-            for _ in range(80):
-                middle = 0.5 * (worst + best)
-                worst, best = (worst, middle) if stays(middle, side) else (middle, best)
-        speed = (side * limits.speeds[j] - v) / dt
-        most = -2.0 * brake * side  # no bound demands more
-        bounds.append(min(max(best, speed), most) if side < 0.0 else max(min(best, speed), most))
-    return bounds[0], bounds[1]
-
-
-@pytest.mark.parametrize("name", judges.sampled(("go2", "talos"), "go2"))
-def test_torques_against_a_qp_written_from_pinocchio_quantities(name):
-    robot = judges.load(name)
-    contacts, standing = judges.stance(robot), robot.standing()
-    limits = JointLimits.of(robot, weight=None)
-    tasks = [fb.PostureTask(standing.q, kp=100.0, kd=20.0), fb.ForceTask(weight=1e-3)]
-    tasks.append(fb.TorqueTask(weight=1e-3))
-    controller = fb.WholeBodyController(robot, contacts, tasks, joint_limits=limits)
-    model, data, d, n_active = robot.model, robot.model.createData(), robot.d, 0
-    for state in near_limits(robot, 6, seed=3):
-        eom = fb.equations_of_motion(state, contacts)  # A, b, J of the contacts
-        M = pin.crba(model, data, np.array(state.q))
-        M = np.triu(M) + np.triu(M, 1).T
-        h = pin.nonLinearEffects(model, data, np.array(state.q), np.array(state.v))
-        qdd, tau, forces = cp.Variable(robot.nv), cp.Variable(d), cp.Variable(contacts.k)
-        error = pin.difference(model, np.array(state.q), np.array(standing.q))[6:]
-        wanted = 100.0 * error - 20.0 * state.v[6:]
-        cost = 0.5 * tasks[0].weight * cp.sum_squares(qdd[6:] - wanted)
-        cost += 0.5e-3 * (cp.sum_squares(forces) + cp.sum_squares(tau))
-        rows = [M[:6] @ qdd + h[:6] == eom.J.T[:6] @ forces]
-        rows += [M[6:] @ qdd + h[6:] == tau + eom.J.T[6:] @ forces, eom.A @ qdd == eom.b]
-        mu = 0.7 / np.sqrt(2.0)
-        for i in range(contacts.n_points):
-            x, y, z = (forces[3 * i + axis] for axis in range(3))
-            rows += [cp.abs(x) <= mu * z, cp.abs(y) <= mu * z]
-        rows += [cp.abs(tau) <= robot.torque_limits]
-        for j in range(d):
-            if np.isfinite(limits.upper[j]):
-                at = robot.nq - d + j
-                least, largest = accelerations_within(limits, state.q[at], state.v[6 + j], j)
-                rows += [qdd[6 + j] >= least, qdd[6 + j] <= largest]
-        problem = cp.Problem(cp.Minimize(cost), rows)
-        tight = {f"tol_{kind}": 1e-11 for kind in ("gap_abs", "gap_rel", "feas")}
-        problem.solve(solver=cp.CLARABEL, **tight)
-        try:
-            command = controller(state.q, state.v)
-        except InfeasibleError:
-            assert problem.status.startswith("infeasible")
-            continue
-        assert problem.status.startswith("optimal")
-        n_active += any(row.kind.endswith("position limit") for row in command.active)
-        assert np.max(np.abs(command.tau - tau.value)) < 1e-4 * robot.torque_limits.max()
-    assert n_active > 0
 
 
 def driven(robot: Robot, joint: int, side: float, period: float, **options: object) -> fb.Rollout:

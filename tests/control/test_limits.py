@@ -16,7 +16,6 @@ import floatbase as fb
 from floatbase.control import LinearInequality
 from floatbase.dynamics import PointContact
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
-from floatbase.qp import solve
 from floatbase.robots import Robot
 
 # rows ---------------------------------------------------------------------------------------------
@@ -65,17 +64,6 @@ def test_user_defined_inequalities_hold_and_have_their_names_on_both_backends(na
             assert command.active == expected.active
         kinds |= {row.kind for row in command.active} | {row.owner for row in command.active}
     assert {"acceleration limit", "total force", "joined torques"} <= kinds
-
-
-def test_user_defined_inequalities_against_cvxpy():
-    robot = judges.load("go2")
-    contacts = judges.stance(robot)
-    rows = user_inequalities(robot, contacts)
-    controller = judges.controller_of("go2", inequalities=rows, backend="compiled")
-    for state in judges.states("go2", 4, 0.1):
-        command, judge = controller(state.q, state.v), solve(controller.qp(state), "cvxpy")
-        assert command.backend == "compiled"
-        assert np.max(np.abs(command.tau - judge["tau"])) < 1e-4 * np.max(robot.torque_limits)
 
 
 def test_conflicting_inequalities_are_reported_by_name():

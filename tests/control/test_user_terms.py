@@ -299,22 +299,6 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
     assert len(tick.tick.signatures) == 1  # numba compiles again for a read-only array
 
 
-def test_ten_thousand_ticks_with_a_user_defined_task_take_no_more_memory_at_the_end():
-    psutil = pytest.importorskip("psutil")
-    robot = judges.load("go2")
-    tasks = [MyCoM(robot.standing().com), *fb.standing_tasks(robot.standing())[1:]]
-    controller = judges.pair(robot, judges.stance(robot), tasks)[0]
-    states = judges.states("go2", 50, 0.1)
-
-    def resident(ticks: int) -> float:
-        for i in range(ticks):
-            controller(states[i % 50].q, states[i % 50].v)
-        return psutil.Process().memory_info().rss / 1e6
-
-    before = resident(2_000)
-    assert resident(10_000) - before < 2.0  # MB: one array kept per tick would take more
-
-
 # constraints --------------------------------------------------------------------------------------
 
 

@@ -102,20 +102,6 @@ def test_b_is_minus_the_change_of_a_v_along_v(name):
         assert np.allclose(contacts.constraint(state)[1], expected, atol=1e-6)
 
 
-def test_a_ball_rolls_without_slipping_over_its_lowest_point():
-    """A ball that satisfies its contact rows moves its centre by ω × (r n), as in pure rolling."""
-    robot = judges.load("go2")
-    n = judges.random_normals(1, 4)[0]
-    contact = PointContact("FL_foot", n, 0.7, 0.05)
-    state = robot.random_state(0)
-    J, still = contact.jacobian(state), np.zeros(robot.nv)
-    still[:] = state.v - np.linalg.pinv(J) @ (J @ state.v)
-    rolling = state.replace(v=still)
-    velocity = rolling.frame_velocity("FL_foot")
-    assert np.linalg.norm(velocity[:3]) > 1e-3
-    assert np.allclose(velocity[:3], np.cross(velocity[3:], 0.05 * n), atol=1e-9)
-
-
 @pytest.mark.parametrize("name", judges.FLAT)
 def test_corner_forces_make_the_wrench_of_their_generators(name):
     rng = np.random.default_rng(0)
@@ -126,32 +112,10 @@ def test_corner_forces_make_the_wrench_of_their_generators(name):
             moment = np.cross(contact.positions(state) - origin, forces).sum(axis=0)
             wrench = contact.force_generator_matrix(state) @ forces.ravel()
             assert np.allclose(wrench, np.concatenate([forces.sum(axis=0), moment]), atol=1e-12)
-            A, _ = contact.constraint(state)
-            assert np.allclose(contact.jacobian(state).T @ forces.ravel(), A.T @ wrench, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", judges.FLAT)
-def test_a_flat_foot_keeps_six_rows_however_many_corners_push(name):
-    for state in judges.states(name, N):
-        for contact in judges.stance(state.robot):
-            assert isinstance(contact, FlatFootContact)
             A, b = contact.constraint(state)
-            assert contact.k == 3 * len(contact.corners) > 6
-            assert A.shape == (6, state.robot.nv)
-            assert b.shape == (6,)
-            assert np.linalg.matrix_rank(contact.jacobian(state)) <= 6
-            assert np.linalg.matrix_rank(A) == 6
-
-
-@pytest.mark.parametrize("name", judges.FLAT)
-def test_corner_motion_rows_would_be_inconsistent_when_a_foot_turns(name):
-    """A flat foot needs 6 rows: at the corners, J q̈ = -J̇ q̇ has no solution if the foot turns."""
-    state = judges.load(name).random_state(0, spread=1.0)
-    contact = next(iter(judges.stance(state.robot)))
-    J = contact.jacobian(state)
-    drift = judges.drift_of(lambda s: contact.jacobian(s), state)
-    left = drift + J @ np.linalg.lstsq(J, -drift, rcond=1e-10)[0]
-    assert np.max(np.abs(left)) > 1e-3
+            assert isinstance(contact, FlatFootContact)
+            assert (A.shape, b.shape) == ((6, state.robot.nv), (6,))
+            assert np.allclose(contact.jacobian(state).T @ forces.ravel(), A.T @ wrench, atol=1e-12)
 
 
 # names, choices, order ----------------------------------------------------------------------------

@@ -309,32 +309,11 @@ def test_on_slopes_the_support_region_is_what_a_grid_of_cvxpy_problems_finds(see
     assert seen == {True, False}
 
 
-def test_slopes_can_make_the_support_region_larger_or_smaller_than_the_feet():
-    feet = np.array([[0.5, 0.0, 0.0], [-0.5, 0.3, 0.0], [-0.5, -0.3, 0.0]])
-    area = ConvexHull(feet[:, :2]).volume
-    # feet on a hilltop: friction must hold them
-    outwards = np.column_stack([feet[:, :2], np.full(3, 0.8)])
-    inwards = np.column_stack([-feet[:, :2], np.full(3, 0.8)])  # feet in a bowl
-    on_top, in_bowl = (of(feet, normals, 0.3).support_region() for normals in (outwards, inwards))
-    areas = [ConvexHull(region).volume if len(region) > 2 else 0.0 for region in (on_top, in_bowl)]
-    assert areas[0] < 0.9 * area
-    steep = np.array([[1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]])
-    assert of(feet[:2], steep, 0.1).support_region().shape[0] <= 2
-    # a wall on the right to lean on: the CoM may stand beside the feet
-    wall = of(np.vstack([feet, [[1.0, 0.0, 1.0]]]), [*([UP] * 3), [-1.0, 0.0, 0.0]], 0.7)
-    assert np.max(wall.support_region()[:, 0]) > 0.5 + 0.1
-
-
 def test_too_steep_a_slope_carries_nothing():
     for angle, stands in ((np.arctan(0.4) - 1e-3, True), (np.arctan(0.4) + 1e-3, False)):
         normals = [[np.sin(angle), 0.0, np.cos(angle)]] * 3
-        region = of(
-            [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]],
-            normals,
-            0.4,
-            4,
-            inside=False,
-        ).support_region()
+        points = [[0.0, 0.0, 0.0], [1.0, 0.0, -np.tan(angle)], [0.0, 1.0, 0.0]]
+        region = of(points, normals, 0.4, inside=False).support_region()
         assert region.shape == ((3, 2) if stands else (0, 2))
 
 
@@ -366,39 +345,6 @@ def test_a_grip_from_all_sides_makes_every_wrench():
 # frames
 
 
-@settings(max_examples=3)
-@given(seeds)
-def test_moving_everything_changes_nothing(seed):
-    here = feet_on_slopes(seed)
-    step = np.random.default_rng(seed).normal(size=3)
-    points, reference = here.points + step, here.reference_point + step
-    there = WrenchSet(points, here.cones, reference, here.weight, here.max_normal_force)
-    assert np.allclose(there.rays, here.rays)
-    region, moved = here.support_region(), there.support_region()
-    assert region.shape == moved.shape
-    assert all(
-        np.min(np.linalg.norm(moved - step[:2] - corner, axis=1)) < 1e-7 for corner in region
-    )
-
-
-@settings(max_examples=6)
-@given(seeds)
-def test_turning_everything_turns_the_wrenches(seed):
-    """The facets may start elsewhere after the rotation.
-
-    Inner polyhedra stay within outer ones, nearly the same.
-    """
-    rng = np.random.default_rng(seed)
-    R = judges.rotation(rng.normal(size=3))
-    here = feet_on_slopes(seed, 3, 48)
-    normals = np.array([cone.normal for cone in here.cones]) @ R.T
-    inner, outer = (of(here.points @ R.T, normals, 0.6, 48, inside) for inside in (True, False))
-    for w in random_wrenches(here, 5, seed):
-        turned = np.kron(np.eye(2), R) @ w
-        assert outer.contains(turned) or not here.contains(w)
-        assert inner.margin(turned) == pytest.approx(here.margin(w), abs=0.02 * np.linalg.norm(w))
-
-
 # input
 
 
@@ -414,20 +360,11 @@ def test_contacts_that_make_no_set_of_wrenches_are_refused():
         (lambda: wrench_set(state, contacts, max_normal_force=0.0), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force=[1.0, 2.0]), "max_normal_force", 4),
         (lambda: wrench_set(state, contacts, max_normal_force="much"), "max_normal_force", 4),
-        (
-            lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix,
-            "face_matrix",
-            "max_normal_force",
-        ),
+        (lambda: wrench_set(state, contacts, max_normal_force=9.0).face_matrix, "face_matrix"),
         (lambda: wrench_set(state, contacts).margin(np.zeros(3)), "wrench", 3, 6),
         (lambda: wrench_set(state, contacts).max_scaling([np.nan] * 6), "direction", np.nan),
         (lambda: wrench_set(state, contacts).max_scaling(np.zeros(6)), "direction"),
         (lambda: wrench_set(state, contacts).max_horizontal_forces(0), "n", 0),
-        (
-            lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)),
-            "cones",
-            "FrictionPolyhedron",
-            2,
-        ),
+        (lambda: WrenchSet(np.zeros((2, 3)), (), np.zeros(3), 1.0, np.ones(2)), "cones", 2),
     ):
         refused(call, InputError, *named)

@@ -10,10 +10,8 @@ from floatbase.lessons import all_exercises, check, progress
 from floatbase.lessons.lessonC import (
     PUZZLES,
     ActiveSetGame,
-    LimitedActiveSet,
     SolverController,
     answer_or_default,
-    braking_qp,
     check_active_set,
     corner_table,
     longest_step,
@@ -87,18 +85,6 @@ def test_equal_solutions_of_any_solver_give_equal_torques():
         assert np.allclose(np.ravel(found.forces), np.ravel(expected.forces), atol=1e-6)
     with pytest.raises(fb.FloatbaseError, match="x has shape"):
         SolverController(controller, lambda qp: np.zeros(3))(state.q, state.v, 0.0)
-
-
-def test_only_a_warm_solver_converges_over_several_steps():
-    qp = braking_qp()
-    for warm in (True, False):
-        solver = LimitedActiveSet(max_rounds=1, warm=warm)
-        for _ in range(40):
-            solver(qp)
-        assert {run.solution.iterations for run in solver.runs} == {1}
-        assert not solver.runs[0].converged and solver.runs[-1].converged == warm
-        if warm:
-            assert np.allclose(solver.runs[-1].solution.x, solve(qp).x, atol=1e-7)
 
 
 def walked(qp, x, most):

@@ -6,7 +6,6 @@ import pickle
 from dataclasses import fields
 from functools import cache
 
-import judges
 import numpy as np
 import pytest
 
@@ -22,13 +21,9 @@ from floatbase.lessons.lessonX import (
     faultless_cases,
     ground_normal,
     judge_line,
-    lagged,
     random_cases,
     record_box,
-    required_forces,
-    sliding_friction_ratios,
 )
-from floatbase.playground import ModelMismatch
 
 # --seed takes others; 0 to 41 were tried by hand: in all 336 boxes the program was right
 SEEDS = (1,)
@@ -47,12 +42,6 @@ def program():
 def cases(seed):
     drawn = random_cases(seed) + faultless_cases(seed)
     return tuple(zip(drawn, black_boxes(seed) + faultless_boxes(seed), strict=True))
-
-
-@cache
-def missing_forces(seed):
-    """What (7) needs besides the measured forces, for each case."""
-    return tuple(required_forces(box) for _, box in cases(seed))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -116,81 +105,5 @@ def test_the_assumed_normal_is_wrong_only_if_it_is_the_fault():
         assert off == pytest.approx(fault.size if fault.kind == "normal" else 0.0, abs=0.2)
 
 
-def test_equation_7_holds_for_all_measurements():
-    for (case, _), forces in zip(cases(1), missing_forces(1), strict=True):
-        base = np.linalg.norm(forces[:, :3], axis=1)
-        if case.pushes:
-            assert base.max() > 200
-        else:  # blows of the fall come after 50 rows
-            assert np.median(base) < 2.0 and base[:50].max() < 10.0, case
-
-
-def test_motors_follow_their_commands_except_with_a_fault_of_motors():
-    for (case, box), forces in zip(cases(1), missing_forces(1), strict=True):
-        off = np.median(np.abs(forces[:, 6:] - box.tau[:-1]), axis=0)
-        is_of_motors = case.injected_fault.kind in ("slow motors", "swapped motors")
-        assert (off.max() > 0.5) == is_of_motors, case
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_evidence_against_a_wrong_diagnosis_is_true(seed):
-    for (case, box), forces in zip(cases(seed)[:6], missing_forces(seed), strict=False):
-        fault, normal = case.injected_fault.kind, ground_normal(box)
-        if fault != "friction":
-            assert np.percentile([1.2, *sliding_friction_ratios(box, normal)], 90) > 1.15
-        early = range(5, min(len(box), 60), 5)
-        plans = [box.equations(i).residual(box.qdd[i], box.tau[i], box.planned[i]) for i in early]
-        drifts = [np.abs(box.equations(i).b).max() for i in early]
-        lost = np.median([np.abs(plan[1]).max() / b for plan, b in zip(plans, drifts, strict=True)])
-        assert (max(np.abs(plan[0]).max() for plan in plans) > 1.0) == (fault == "mass")
-        assert lost > 0.99 if fault == "drift" else lost < 0.01
-        got, told = forces[:, 6:], box.tau[:-1]
-        lags = [lagged(told, 0.002, ms) - got for ms in range(0, 120, 2)]
-        late = [np.median(np.abs(lag), axis=0).max() for lag in lags]
-        if fault == "swapped motors":
-            assert min(late) > 0.5
-        elif fault != "slow motors":
-            assert late[0] < 0.5
-
-
 def test_a_forgotten_drift_fells_the_robot():
     assert crash_test("drift").fell
-
-
-def test_a_wrong_mass_scales_the_planned_forces():
-    state = judges.load("go2").standing()
-    tasks, contacts = fb.standing_tasks(state), fb.Contacts.points(state.robot)
-    mismatch = ModelMismatch(mass=1.2)
-    heavy = fb.WholeBodyController(state.robot, contacts, tasks, modify_qp=mismatch)
-    planned = heavy(state.q, state.v).forces[2::3].sum()
-    assert planned == pytest.approx(1.2 * state.robot.weight, rel=1e-3)
-    box = crash_test("mass", 1.2, seconds=0.01)
-    assert box.planned[0, 2::3].sum() == pytest.approx(1.2 * box.robot.weight, rel=1e-3)
-
-
-def test_the_lag_is_of_first_order():
-    orders = np.ones((200, 1))
-    orders[0] = 0.0
-    out = lagged(orders, 0.002, 40.0)
-    assert out[20, 0] == pytest.approx(1.0 - np.exp(-1.0), abs=1e-9)
-    assert np.array_equal(lagged(orders, 0.002, 0.0), orders)
-
-
-def test_the_required_torques_are_those_that_were_applied():
-    """The physics' own, which no box holds."""
-    robot = judges.load("go2")
-    state = robot.standing()
-    contacts = fb.Contacts.points(robot, mu=1.2)
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    sim = fb.Simulation(robot, 1.2)
-    sim.reset(state)
-    record = fb.rollout(sim, controller, 0.3, [fb.Push(np.array([30.0, 0.0, 0.0]), 0.05)], 0.002)
-    box = BlackBox(
-        "test", robot, record.contacts, record.time, record.q, record.v, record.measured,
-        record.tau_desired, record.planned, np.zeros_like(record.v),
-    )  # fmt: skip
-    found = required_forces(box)
-    assert np.abs(found[:, 6:] - record.tau[:-1]).max() < 0.2
-    pushed = (record.time[:-1] > 0.06) & (record.time[:-1] < 0.14)
-    assert np.abs(found[pushed, 0] - 30.0).max() < 1.0
-    assert np.abs(found[~pushed][60:, 0]).max() < 1.0

@@ -109,14 +109,6 @@ def test_a_package_without_lessons_is_refused(tmp_path):
         prepare_workspace(tmp_path / "notebooks", tmp_path)
 
 
-def test_a_newer_lesson_replaces_one_that_was_only_run(course):
-    prepare_workspace(course)
-    write(course / MY_FOLDER / LESSON, "first = 1", output="1\n")
-    write(course / LESSON, "first = 2")
-    assert prepare_workspace(course) == [f"{LESSON}: updated"]
-    assert source(course / MY_FOLDER / LESSON) == "first = 2"
-
-
 @pytest.mark.parametrize("forget", [False, True])
 def test_newer_lessons_are_put_beside_edited_copies(mine, forget):
     """Whichever file the learner continues in, and also when the record of copies is lost."""

@@ -40,14 +40,6 @@ def test_the_residual_is_the_rate_of_the_angular_momentum_less_the_desired_one(n
             assert np.max(np.abs(found - expected)) < 1e-5 * (1.0 + np.max(np.abs(expected)))
 
 
-def test_both_backends_agree_on_it():
-    robot = judges.load("go2")
-    tasks = [*fb.standing_tasks(robot.standing()), AngularMomentumTask(weight=1.0)]
-    compiled, reference = judges.pair(robot, judges.stance(robot), tasks)
-    for state in judges.states("go2", 3, 0.1):
-        assert judges.difference(compiled, reference, state) < 1e-8 * robot.torque_limits.max()
-
-
 def test_in_the_air_no_torque_changes_the_angular_momentum():
     state = judges.load("go2").random_state(0)
     eom = fb.equations_of_motion(state, fb.Contacts.none())

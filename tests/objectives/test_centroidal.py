@@ -6,7 +6,6 @@ import cvxpy as cp
 import judges
 import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
 from judges import Array
 from messages import refused
@@ -113,23 +112,8 @@ def test_the_wrench_of_contact_forces_is_the_rate_of_mujocos_momentum_less_gravi
         scale = np.abs(forces).sum()
         assert np.allclose(wrench["force"](forces), rate[:3] - gravity, atol=1e-6 * scale)
         assert np.allclose(wrench["moment"](forces), rate[3:], atol=1e-6 * scale)
-
-
-def test_a_force_up_at_the_left_feet_rolls_the_robot_right_and_footnote_10_would_roll_it_left():
-    """By (x_i - x_c) × f_i, an upward force at y > 0 turns about +x. Footnote 10 of the course text
-    prints x_c - x_i, which has the opposite sign.
-    """
-    state = judges.load("go2").standing()
-    contacts = fb.Contacts.points(state.robot)
-    left = contacts.positions(state)[:, 1] > 0
-    up = np.zeros((4, 3))
-    up[left, 2] = 10.0
-    moment = objectives.net_moment_matrix(state, contacts) @ up.ravel()
-    assert moment[0] > 1.0
-    rate = mujocos_momentum_rate(state, contacts, up.ravel(), np.zeros(12))[0][3:]
-    footnote = np.cross(state.com - contacts.positions(state), up).sum(axis=0)
-    assert np.allclose(moment, rate, atol=1e-5)
-    assert np.allclose(footnote, -rate, atol=1e-5)
+        moments = objectives.net_moment_matrix(state, contacts) @ forces
+        assert np.allclose(moments, rate[3:], atol=1e-6 * scale)
 
 
 def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name):
@@ -141,16 +125,6 @@ def test_there_is_one_identity_block_for_each_point_four_for_four_feet(name):
         assert np.array_equal(block, np.eye(3))
     if name in judges.BALLS:
         assert G_f.shape == (3, 12)
-
-
-def test_contact_forces_make_six_numbers_and_what_is_left_over_is_internal(name):
-    state = judges.load(name).random_state(0)
-    contacts = judges.stance(state.robot)
-    eom = fb.equations_of_motion(state, contacts)
-    G = objectives.com_wrench_map(state, contacts).A
-    assert np.linalg.matrix_rank(G) == 6
-    assert np.allclose(G @ dynamics.internal_forces(eom), 0.0, atol=1e-9)
-    assert dynamics.internal_forces(eom).shape[1] == contacts.k - 6
 
 
 # (22) ---------------------------------------------------------------------------------------------
@@ -173,27 +147,6 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(name)
         assert np.allclose(rate[3:], spin, atol=1e-4 * state.robot.weight)
 
 
-def test_weights_decide_which_part_of_a_wrench_out_of_reach_is_missed():
-    """Eq. (22) adds N² and (N·m)². In N·mm, a moment has a million times the weight. solo8 cannot
-    push sideways without a moment.
-    """
-    state = judges.load("solo8").standing()
-    contacts = fb.Contacts.points(state.robot)
-    zeta = fb.forces_from_torques(fb.equations_of_motion(state, contacts))
-    force, moment = objectives.desired_wrench(state, [5.0 / state.robot.mass, 0.0, 0.0])
-    force = force[[1, 0, 2]]  # 5 N sideways
-    got = {}
-    for weight in (1.0, 1e6):
-        cost = objectives.wrench_objective(state, contacts, force, moment, moment_weight=weight)
-        forces = zeta(cost.pullback(zeta).minimiser())
-        got[weight] = objectives.com_wrench_map(state, contacts)(forces)
-    missed = {weight: wrench - np.concatenate([force, moment]) for weight, wrench in got.items()}
-    assert np.linalg.norm(missed[1.0][:3]) < 0.1 < 0.15 < np.linalg.norm(missed[1.0][3:])
-    assert np.linalg.norm(missed[1e6][3:]) < 1e-3 and np.linalg.norm(missed[1e6][:3]) > 4.9
-    only_moment = objectives.wrench_objective(state, contacts, force, moment, force_weight=0.0)
-    assert np.linalg.matrix_rank(only_moment.H) == 3
-
-
 def test_the_wrench_objective_has_the_value_of_its_formula():
     """One or two feet cannot produce all six numbers, so the minimum is above zero."""
     rng = np.random.default_rng(0)
@@ -202,12 +155,13 @@ def test_the_wrench_objective_has_the_value_of_its_formula():
         contacts = fb.Contacts.points(state.robot)
         contacts = contacts.only(*contacts.names[:feet])
         force, moment = 50.0 * rng.normal(size=3), 5.0 * rng.normal(size=3)
-        cost = objectives.wrench_objective(state, contacts, force, moment)
+        weights = {"force_weight": 0.5, "moment_weight": 3.0}
+        cost = objectives.wrench_objective(state, contacts, force, moment, **weights)
         lam = rng.normal(size=3 * feet)
         points = contacts.positions(state)
         f = lam.reshape(-1, 3)
-        direct = 0.5 * np.sum((force - f.sum(axis=0)) ** 2)
-        direct += 0.5 * np.sum((moment - np.cross(points - state.com, f).sum(axis=0)) ** 2)
+        direct = 0.25 * np.sum((force - f.sum(axis=0)) ** 2)
+        direct += 1.5 * np.sum((moment - np.cross(points - state.com, f).sum(axis=0)) ** 2)
         assert cost(lam) == pytest.approx(direct, rel=1e-10)
         assert (cost(cost.minimiser()) > 1e-3) == (feet < 3)
 
@@ -233,29 +187,6 @@ def test_the_force_bias_is_squared_friction_plus_alpha_times_squared_distance_fr
         assert objectives.normal_bias(contacts, a)(lam) == pytest.approx(normal, rel=1e-10)
         expected = tangential + alpha * normal
         assert objectives.force_bias(contacts, alpha, a)(lam) == pytest.approx(expected, rel=1e-10)
-
-
-def test_with_the_bias_the_forces_of_a_desired_wrench_are_unique_and_cvxpys():
-    """Eq. (22) plus w times eq. (23), the purpose of section 3.1.1: without the bias, six
-    directions have no cost.
-    """
-    state = judges.load("go2").standing()
-    contacts = fb.Contacts.points(state.robot, normals=LEAN)
-    force, moment = objectives.desired_wrench(state, [0.5, -0.3, 0.2], [1.0, 0.5, 0.2])
-    wrench = objectives.wrench_objective(state, contacts, force, moment)
-    assert np.linalg.matrix_rank(wrench.H) == 6
-    cost = wrench + 0.1 * objectives.force_bias(contacts, 0.5, 30.0)
-    assert np.linalg.eigvalsh(cost.H)[0] > 1e-3
-    x = cp.Variable((4, 3))
-    points = contacts.positions(state)
-    total = sum(pin.skew(p - state.com) @ x[i] for i, p in enumerate(points))
-    direct = 0.5 * cp.sum_squares(cp.sum(x, axis=0) - force)
-    direct += 0.5 * cp.sum_squares(total - moment)
-    for i, n in enumerate(LEAN):
-        direct += 0.05 * cp.sum_squares(x[i] - n * (n @ x[i]))
-        direct += 0.025 * cp.square(n @ x[i] - 30.0)
-    cp.Problem(cp.Minimize(direct)).solve(**TIGHT)
-    assert np.allclose(cost.minimiser().reshape(4, 3), x.value, atol=1e-4)
 
 
 # (24)(25) -----------------------------------------------------------------------------------------
@@ -300,19 +231,6 @@ def test_the_smallest_torques_for_reachable_forces_are_cvxpys(name, seed):
         assert np.linalg.norm(tau) < 0.999 * np.linalg.norm(tau0)
     elif name in ("go2", "solo12"):
         assert np.allclose(tau, tau0, atol=1e-6)
-
-
-def test_free_torques_move_the_arm_and_leave_every_contact_force_as_it_is():
-    eom = judges.at_rest("anymal_kinova", 0)
-    found = objectives.torques_from_forces(eom)
-    rng = np.random.default_rng(0)
-    tau = rng.normal(size=eom.d)
-    zeta, eta = dynamics.forces_from_torques(eom), dynamics.accelerations_from_torques(eom)
-    more = found.null_torques @ rng.normal(size=found.null_torques.shape[1])
-    assert np.allclose(zeta(tau + more), zeta(tau), atol=1e-8)
-    assert np.linalg.norm(eta(tau + more) - eta(tau)) > 1e-2
-    # the smallest torques have no part of them
-    assert np.allclose(found.null_torques.T @ found.torque(zeta(tau)), 0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7])

@@ -1,4 +1,4 @@
-"""Tasks for relative poses, axes and the centre of pressure: by finite differences and in physics.
+"""Tasks for relative poses, axes and the centre of pressure, by finite differences.
 
 The finite differences use only positions from Pinocchio's forward kinematics.
 """
@@ -20,7 +20,6 @@ from floatbase.objectives import AxisTask, CentreOfPressureTask, RelativePoseTas
 name = judges.every_robot
 UP = np.array([0.0, 0.0, 1.0])
 STEP = 1e-5  # s
-HANDS = ("gripper_left_base_link", "gripper_right_base_link")  # of Talos
 
 
 def world_pose(state: fb.State, frame: str) -> np.ndarray:
@@ -110,80 +109,6 @@ def test_the_pressure_residual_is_zero_at_the_centre_of_pressure_and_linear_in_t
                 residual = CentreOfPressureTask(given).residual(eom)
                 assert np.allclose(residual(forces.ravel()), expected, atol=1e-9 * total)
                 assert not np.any(residual.b)
-
-
-def test_both_backends_agree_on_them():
-    for robot_name, pair in (("go2", ("FL_hip", "RR_thigh")), ("talos", HANDS)):
-        robot = judges.load(robot_name)
-        at, contacts = robot.standing(), judges.stance(robot)
-        pose = relative_pose(*pair, at)
-        tasks = [
-            *fb.standing_tasks(at),
-            RelativePoseTask(*pair, lambda t, pose=pose: (pose, np.full(6, 0.1 * t), np.ones(6))),
-            AxisTask("base", UP, [0.0, 0.1, 1.0]),
-            CentreOfPressureTask(at.com * [1.0, 1.0, 0.0] + [0.01, 0.0, 0.0]),
-        ]
-        both = judges.pair(robot, contacts, tasks)
-        for i, state in enumerate(judges.near_and_far(robot_name, 2)):
-            assert judges.difference(*both, state, 0.1 * i) < judges.agreement(robot)
-
-
-def test_one_hand_reaches_a_pose_relative_to_the_other_while_the_robot_moves():
-    robot = judges.load("talos")
-    at = robot.standing()
-    goal = at.frame_pose(HANDS[1]).actInv(at.frame_pose(HANDS[0])).homogeneous
-    goal[:3, 3] += [0.0, 0.05, 0.03]
-    goal[:3, :3] = judges.rotation([0.2, 0.0, 0.0]) @ goal[:3, :3]
-    sway = fb.CoMTask(lambda t: at.com + [0.0, 0.02 * np.sin(3.0 * t), 0.0])
-    tasks = [sway, *fb.standing_tasks(at)[1:], RelativePoseTask(*HANDS, goal)]
-    controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
-    run = fb.rollout(fb.Simulation(robot), controller, 1.5, control_period=2e-3)
-    assert run.outcome == "completed"
-    left = np.linalg.inv(goal) @ relative_pose(*HANDS, run.final)
-    assert np.linalg.norm(left[:3, 3]) < 2e-3
-    assert np.linalg.norm(judges.turn_between(left[:3, :3], np.eye(3))) < 0.01
-
-
-def test_an_axis_comes_to_its_direction_while_rotation_about_it_is_left_to_others():
-    robot = judges.load("go2")
-    at = robot.standing()
-    yawed = judges.rotation([0.0, 0.0, 0.15])
-    direction = np.array([0.1, 0.0, 1.0]) / np.linalg.norm([0.1, 0.0, 1.0])
-    # the light orientation task decides only the heading
-    tasks = [
-        fb.CoMTask(at.com),
-        AxisTask("base", UP, direction, weight=100.0),
-        fb.OrientationTask("base", yawed, weight=0.1),
-        fb.PostureTask(at.q),
-    ]
-    controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
-    run = fb.rollout(fb.Simulation(robot), controller, 2.0, control_period=2e-3)
-    R = run.final.frame_pose("base").rotation
-    assert np.linalg.norm(np.cross(R @ UP, direction)) < 5e-3
-    assert abs(np.arctan2(R[1, 0], R[0, 0]) - 0.15) < 0.02
-
-
-def test_the_measured_centre_of_pressure_follows_a_target_inside_the_feet():
-    robot, amplitude, rate = judges.load("talos"), 0.02, 12.0  # m, rad/s
-    at, contacts = robot.standing(), judges.stance(robot)
-    ground = at.com * [1.0, 1.0, 0.0] + [0.0, 0.0, contacts.positions(at)[:, 2].mean()]
-
-    def target(t: float) -> np.ndarray:
-        return np.asarray(ground + [0.0, amplitude * np.sin(rate * t), 0.0])
-
-    def error(*more: object) -> float:
-        tasks = [*fb.standing_tasks(at), fb.ForceTask(weight=1e-4), *more]
-        controller = fb.WholeBodyController(robot, contacts, tasks, backend="compiled")
-        run = fb.rollout(fb.Simulation(robot), controller, 1.0, control_period=2e-3)
-        assert run.outcome == "completed"
-        late = [i for i, t in enumerate(run.time) if t > 0.3]
-        points = [centre_of_pressure(run.state(i), contacts, run.measured[i]) for i in late]
-        found = [p[1] - target(run.time[i])[1] for i, p in zip(late, points, strict=True)]
-        return float(np.sqrt(np.mean(np.square(found))))
-
-    without = error()
-    assert without > 0.5 * amplitude
-    assert error(CentreOfPressureTask(target, weight=1.0)) < 0.3 * without
 
 
 def test_wrong_arguments_are_reported():

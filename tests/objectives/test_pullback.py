@@ -116,18 +116,6 @@ def test_costs_may_be_given_on_any_of_the_three_and_add_up():
     assert objectives.cost_on_space(space)(beta) == 0.0
 
 
-def test_a_cost_on_all_three_at_once_may_couple_them():
-    """Eq. (18) for a Q(q̈, τ, λ) that is not a sum of three costs, such as (τ - K q̈)²."""
-    eom = judges.at_rest("go2", feet=2)
-    space = dynamics.feasible_space(eom)
-    rng = np.random.default_rng(0)
-    A, r = rng.normal(size=(60, space.map.n_out)), rng.normal(size=60)
-    seen = Quadratic.from_residual(A, r).pullback(space.map)
-    beta = rng.normal(size=space.dimension)
-    expected = 0.5 * float(np.sum((A @ np.concatenate(space(beta)) - r) ** 2))
-    assert seen(beta) == pytest.approx(expected, rel=1e-10)
-
-
 # (19) ---------------------------------------------------------------------------------------------
 
 
@@ -170,22 +158,6 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
             assert (smallest(x) == pytest.approx(best(x), rel=1e-7)) == agree
 
 
-def test_standing_still_on_four_feet_costs_29_times_as_much_in_the_literal_reading_of_19():
-    """go2 with a cost on squared friction and a little torque: the smallest β leaves friction that
-    the best β removes by internal forces.
-    """
-    eom = judges.at_rest("go2")
-    space = dynamics.feasible_space(eom)
-    sideways = np.kron(np.eye(4), np.diag([1.0, 1.0, 0.0]))
-    still, none = np.zeros(18), np.zeros(12)
-    residuals = {"tau": (np.sqrt(1e-3) * np.eye(12), none), "forces": (sideways, none)}
-    cost = objectives.cost_on_space(space, **as_quadratics(residuals))
-    best, smallest = (reading(cost, space, "qdd")(still) for reading in READINGS)
-    expected = least(eom, residuals, {"qdd": still})
-    assert best == pytest.approx(expected, rel=1e-6)
-    assert smallest / best == pytest.approx(29.0, abs=0.5)
-
-
 def test_accelerations_that_cannot_change_do_not_determine_beta():
     """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
     β must not contain 1 / rounding.
@@ -211,17 +183,6 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
         with raises(InputError):
             call(reward, space, "qdd")
     assert np.isfinite(objectives.minimum_norm_pullback(reward, space, "qdd")(np.zeros(18)))
-
-
-def test_a_cost_that_bends_down_over_what_the_block_leaves_free_is_refused():
-    """A cost with negative curvature has no minimum either: its stationary point is the worst, not
-    the best.
-    """
-    eom = judges.at_rest("go2")
-    space = dynamics.feasible_space(eom)
-    hill = objectives.cost_on_space(space, forces=Quadratic(-np.eye(12), np.zeros(12)))
-    with raises(InputError):
-        objectives.partial_minimum(hill, space, "qdd")
 
 
 def test_directions_that_cost_nothing_are_left_alone():

@@ -13,7 +13,6 @@ import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
 
 N = 5
-STILL = 1e-3  # rad/s or m/s, 2.5 s after setting a target 30 mm away; the actual value is 2e-5
 # rad: on the arm of anymal_kinova, gravity leaves half of it with a posture of small weight
 DRIFT = 0.01
 
@@ -187,25 +186,6 @@ def test_a_target_is_copied_when_a_task_is_made():
     eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
     forces += 1.0
     assert np.array_equal(hold.residual(eom)(np.zeros(12)), np.zeros(12))
-
-
-def test_a_centre_of_mass_sent_elsewhere_arrives_within_a_millimetre_and_is_still():
-    """The target is 30 mm to the left. For solo8, whose legs cannot lean sideways, it is 20 mm
-    back.
-    """
-    wrong = []
-    for name in ("go2", "solo8", "talos"):
-        robot = judges.load(name)
-        standing = robot.standing()
-        target = standing.com + ([-0.02, 0.0, 0.0] if name == "solo8" else [0.0, 0.03, 0.0])
-        tasks = [fb.CoMTask(target), *fb.standing_tasks(standing)[1:]]
-        controller = fb.WholeBodyController(robot, judges.stance(robot), tasks)
-        run = fb.rollout(fb.Simulation(robot), controller, 2.5, control_period=2e-3)
-        left = 1e3 * float(np.linalg.norm(target - run.com[-1]))
-        speed = float(np.abs(run.final.v).max())
-        if left > 1.0 or speed > STILL:
-            wrong.append(f"{name}: {left:.2f} mm short, {speed:.1e} rad/s or m/s")
-    assert wrong == []
 
 
 def test_standing_tasks_keep_the_arms_where_they_were():

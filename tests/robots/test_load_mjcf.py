@@ -123,6 +123,20 @@ def test_keyframes_are_postures(quadruped):
     assert quadruped(posture=quadruped().posture) == quadruped()
 
 
+@pytest.mark.parametrize(
+    ("knee", "quaternion", "named"),
+    [(-1.5, "0 1 0 0", "w, x, y, z"), (0.0, "1 0 0 0", "legs"), (-1.5, "1 0 0 0", None)],
+)
+def test_a_keyframe_upside_down_or_with_straight_legs_is_reported(load, knee, quaternion, named):
+    home = HOME.replace("-1.5", str(knee)).replace("0.1 0.8", "0 0.4")
+    text = QUADRUPED.replace("0.6 0 0 0.8", quaternion).replace(HOME, home)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load(text.replace("-150 -5", "-150 0"))
+    found = [str(each.message) for each in caught]
+    assert len(found) == (named is not None) and all(named in message for message in found)
+
+
 def test_a_quadruped_stands_on_its_named_geoms_and_takes_a_push(quadruped):
     robot = quadruped()
     state, contacts = robot.standing(), fb.Contacts.feet(robot)
@@ -183,6 +197,7 @@ def test_the_robot_is_the_free_body_with_joints_or_what_is_attached_to_the_world
         (pendulum(rest='<option gravity="0 0 -1.6"/>'), -1.6),
         (pendulum(rest='<option><flag gravity="disable"/></option>'), 9.81),
         (pendulum('<joint name="swing" stiffness="3"/>'), "swing"),
+        (pendulum('<joint name="loose" type="free" armature="1"/>'), "loose"),
         (pendulum(rest='<equality><weld name="bolt" body1="link"/></equality>'), "bolt"),
         (
             pendulum(
@@ -205,6 +220,29 @@ def test_what_the_robot_does_not_have_is_named(load, mjcf, named):
     with warnings.catch_warnings():
         warnings.simplefilter("error", RobotWarning)
         load(pendulum())
+
+
+def test_joints_that_an_equality_couples_are_locked_as_in_mujoco(load):
+    """MuJoCo measures a coupling from the initial configuration, which `ref` sets."""
+    mjcf = """<mujoco><compiler angle="radian"/><worldbody><body><joint name="a" ref="0.3"/>
+      <geom size="0.1"/><body pos="1 0 0"><joint name="b" axis="1 0 0" ref="-0.2"/>
+      <geom size="0.1"/><body name="tip" pos="0 1 0"><joint name="c"/><geom size="0.1"/>
+      </body></body></body></worldbody>
+      <equality><joint joint1="b" joint2="a" polycoef="0.1 -2 {} 0 0"/></equality></mujoco>"""
+    with warns(RobotWarning, "a", "b", "locked"):
+        robot = load(mjcf.format(0), posture={"a": 0.5})
+    model = mujoco.MjModel.from_xml_string(mjcf.format(0))
+    data = mujoco.MjData(model)
+    data.qpos = [0.5, 0.0, 0.0]
+    mujoco.mj_forward(model, data)
+    data.qpos[1] -= data.efc_pos[0]
+    mujoco.mj_forward(model, data)
+    tip = robot.standing().frame_pose("tip")
+    assert abs(data.efc_pos[0]) < 1e-12 and robot.joint_names == ("c",)
+    assert np.allclose(tip.translation, data.body("tip").xpos)
+    assert np.allclose(tip.rotation.ravel(), data.body("tip").xmat)
+    with warns(RobotWarning, "equality_0"):  # it is not linear
+        assert load(mjcf.format(1)).d == 3
 
 
 def test_an_arm_keeps_its_rotor_inertias_when_it_is_locked_or_set_free(load):

@@ -52,6 +52,7 @@ def same_robot(urdf, **options):
         PLAIN.replace("0 0 -1", "0\t0\n  -1.0 "),
         PLAIN.replace("<robot", '<robot xmlns="http://ros.org"'),
         PLAIN.replace("<robot", '<robot xmlns:xacro="http://ros.org"'),
+        added('<drake:joint acceleration:x="2"/><!-- <robot n:a -->'),
         PLAIN.replace('lower="-1" upper="1"', 'lower="-inf" upper="+Infinity"'),
         PLAIN.replace('effort="9"', 'effort="inf"'),
         PLAIN.replace(LIMIT, LIMIT + '<safety_controller k_velocity="x"/>'),

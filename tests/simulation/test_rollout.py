@@ -248,17 +248,6 @@ def test_an_arm_bolted_to_the_ground_never_falls():
     assert np.linalg.norm(record.final.q - record.q[0]) > 0.1, "it did not move"
 
 
-def test_an_arm_under_the_controller_reaches_its_posture():
-    robot = judges.load("ur5")
-    target = robot.standing().q + 0.2
-    task = fb.PostureTask(target, weight=1e3)
-    controller = fb.WholeBodyController(robot, fb.Contacts.none(), [task])
-    record = fb.rollout(fb.Simulation(robot), controller, 1.0)
-    assert record.outcome == "completed"
-    assert record.planned.shape == record.measured.shape == (1000, 0)
-    assert np.allclose(record.final.q, target, atol=5e-3)
-
-
 def test_a_controller_that_writes_into_its_arguments_changes_nothing(sim):
     def careless(q: np.ndarray, v: np.ndarray, t: float) -> Torques:
         q[:], v[:] = 0.0, 1.0
@@ -290,13 +279,6 @@ def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zer
     assert record.foot_positions.shape == (5, 3, 3)
     assert np.all(np.isnan(record.foot_positions[:, 2]))
     assert np.all(np.isfinite(record.planned))
-
-
-@pytest.mark.parametrize("normal", [(0.2, 0.0, 1.0), (-0.1, 0.15, 1.0)])
-def test_a_robot_starts_with_every_foot_on_a_slope(normal):
-    sim = fb.Simulation(judges.load("go2"), ground=fb.Ground(normal=np.array(normal)))
-    heights = sim.contact_positions() @ sim.ground.normals[0]
-    assert np.max(np.abs(heights)) < 1e-9
 
 
 # a stance that changes ----------------------------------------------------------------------------

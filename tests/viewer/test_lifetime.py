@@ -11,9 +11,7 @@ import subprocess
 import threading
 import time
 
-import msgpack
 import numpy as np
-import psutil
 import pytest
 from browsers import CHROMIUM, FLAGS
 from jupyter_client.manager import start_new_kernel
@@ -21,25 +19,8 @@ from waiting import PATIENCE, until
 
 from floatbase.viewer.scene import protocol
 
-from .test_window import window_threads
-
-MB = 1 << 20
 # s: a sixth of what a page may take over a frame, so a call that waits for a page takes longer
 HUNG = 5.0
-
-
-def memory():
-    """Return the memory of this process in bytes."""
-    return int(psutil.Process().memory_info().rss)
-
-
-def answers(port):
-    """Return whether anything listens on a port."""
-    try:
-        socket.create_connection(("127.0.0.1", port), timeout=2).close()
-    except OSError:
-        return False
-    return True
 
 
 @pytest.mark.front_end
@@ -88,28 +69,6 @@ def sleeper(window):
         )
         until(lambda: window.n_pages == 1)
         yield client
-
-
-@pytest.mark.front_end
-def test_updates_for_a_page_that_never_reads_take_no_memory(window, sleeper):
-    (_, command) = protocol.set_object("/meshcat/a", msgpack.packb({"data": "x" * 20_000}))
-
-    def draw(n):
-        for i in range(n):
-            path = f"/meshcat/{i % 5}"
-            shape = ((path, "set_object", ""), command)
-            window.put([shape, protocol.set_transform(path, np.eye(4))])
-
-    draw(5_000)
-    before = memory()
-    draw(45_000)  # 0.9 GB, had it been kept
-    assert memory() - before < 20 * MB
-    assert len(window.scene) == 10
-    assert window.n_pages == 1
-    threads = len(window_threads())
-    window.close()
-    assert len(window_threads()) == threads - 1
-    assert not answers(window.port)
 
 
 def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):

@@ -21,6 +21,8 @@ from floatbase.robots import catalogue, load
 from .looks import control, eventually, picture
 
 SIDES = ("left", "right")
+ARM = """<mujoco><worldbody><body><joint name="rail" type="slide"/><geom size="1"/></body>
+</worldbody><keyframe><key name="zero"/><key name="up" qpos="0.5"/></keyframe></mujoco>"""
 
 
 def test_the_robots_are_listed(capsys):
@@ -38,6 +40,7 @@ def test_wrong_arguments_are_a_message_and_not_a_traceback(tmp_path, capsys):
         ([str(tmp_path / "none.urdf")], "none.urdf"),
         ([str(file), "--posture", "FL_KFE"], "--posture", "FL_KFE"),
         (["go2", "--posture", "*_cal=1"], "*_cal", "FL_calf_joint"),
+        (["go2", "--posture", "home"], "--posture", "home", "keyframe"),
     ):
         assert main(["view", *arguments, "--no-browser"]) == 2
         assert not missing(capsys.readouterr().err, *named)
@@ -62,6 +65,10 @@ def test_a_robot_is_described_by_the_arguments(tmp_path, monkeypatch):
         assert knees == [0.6, 0.7]
     assert main(["view", "go2", "--feet"]) == 2
     assert shown[-1].feet == ()
+    arm = tmp_path / "arm.xml"
+    arm.write_text(ARM)
+    assert main(["view", str(arm), "--posture", "up"]) == 2
+    assert shown[-1].posture.tolist() == [0.5]
 
 
 @pytest.mark.front_end

@@ -54,13 +54,9 @@ class ActivePlan:
         self._entries = entries
         self._adjustment = adjustment
         self._path, self._swings = plan.path, plan.swings
-        usual = (
-            adjustment is None
-            and type(plan.plan) is LIPM
-            and plan.plan.omega == posture.omega
-            and all(type(path) is Swing for path in self._swings.values())
-        )
-        self._numbers = None if not (compiled and usual) else _compiled_module()
+        usual = adjustment is None and all(type(path) is Swing for path in self._swings.values())
+        usual = usual and type(plan.plan) is LIPM and plan.plan.omega == posture.omega
+        self._numbers = _compiled_module() if compiled and usual else None
         if self._numbers:
             self._write = self._numbers.write_targets
             self._body = self._pack_body(self._numbers)
@@ -78,13 +74,10 @@ class ActivePlan:
         numbers = self._numbers
         if numbers is None:
             return self._path
-        body = self._body
-        return Path(
-            float(body[numbers.TIME]),
-            body[numbers.POSITION : numbers.POSITION + 2].copy(),
-            float(body[numbers.YAW]),
-            body[numbers.VELOCITY : numbers.VELOCITY + 3].copy(),
-        )
+        position = self._body[numbers.POSITION : numbers.POSITION + 2].copy()
+        velocity = self._body[numbers.VELOCITY : numbers.VELOCITY + 3].copy()
+        time, yaw = float(self._body[numbers.TIME]), float(self._body[numbers.YAW])
+        return Path(time, position, yaw, velocity)
 
     @property
     def swings(self) -> dict[str, SwingPath]:
@@ -100,13 +93,8 @@ class ActivePlan:
     def changed(self, desired: DesiredMotion, pose: BodyPose) -> ActivePlan:
         """Return the same plan in its present state with another desired motion and pose."""
         swings, planned = self.swings, self.plan.planned_swings
-        now = replace(
-            self.plan,
-            path=self.path,
-            planned_swings={
-                foot: replace(each, path=swings[foot]) for foot, each in planned.items()
-            },
-        )
+        moved = {foot: replace(swing, path=swings[foot]) for foot, swing in planned.items()}
+        now = replace(self.plan, path=self.path, planned_swings=moved)
         other = ActivePlan(
             self._posture, now, desired, pose, self._reach, self._entries, self._adjustment,
             self._numbers is not None,
@@ -155,11 +143,9 @@ class ActivePlan:
             position = as_array(f"the adjusted foothold of {foot}", end, (None,), "m")
             if foot in self._swings:
                 ground = self.plan.planned_swings[foot].ground
-                ends[foot] = (
-                    self._posture.on_ground(foot, position, ground)
-                    if len(position) == 2
-                    else as_array(f"the adjusted foothold of {foot}", position, (3,), "m")
-                )
+                if len(position) == 2:
+                    position = self._posture.on_ground(foot, position, ground)
+                ends[foot] = as_array(f"the adjusted foothold of {foot}", position, (3,), "m")
         return ends
 
     def _pack_body(self, numbers: Any) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,11 +10,10 @@ import numpy.typing as npt
 from floatbase._geometry import convex_hull, distance_to_polygon
 from floatbase._validation import Array, as_array, as_number, as_positive, read_only
 from floatbase.behaviours._level_place import foot_outline, level_place
-from floatbase.behaviours.walk.gait import Gait
-from floatbase.behaviours.walk.options import WalkOptions
-from floatbase.behaviours.walk.path import Path
 from floatbase.errors import InputError
-from floatbase.robots import Robot
+
+if TYPE_CHECKING:
+    from floatbase.behaviours.walk.walk import Walk
 
 _MAX_EXPONENT = 50.0  # ω times a time: an error that grows by e^{50} is beyond any robot's reach
 _EDGE_REACH = 0.15  # m: footholds are moved by at most this much to avoid an edge
@@ -52,10 +51,8 @@ def neutral_point(
     """
     nominal_foothold = as_array("nominal_foothold", nominal_foothold, (2,), "m")
     velocity = as_array("velocity", velocity, (2,), "m/s")
-    return read_only(
-        nominal_foothold
-        + velocity * as_positive("stance_time", stance_time, "s", allow_zero=True) / 2.0
-    )
+    stance_time = as_positive("stance_time", stance_time, "s", allow_zero=True)
+    return read_only(nominal_foothold + velocity * stance_time / 2.0)
 
 
 def capture_point(com: npt.ArrayLike, velocity: npt.ArrayLike, omega: float) -> Array:
@@ -168,42 +165,14 @@ def step_adjustment(
     """
     error = as_array("dcm_error", dcm_error, (2,), "m")
     size = float(np.linalg.norm(error))
-    scale = max(0.0, size - as_positive("dead_zone", dead_zone, "m", allow_zero=True)) / (
-        size or 1.0
-    )
-    exponent = as_positive("omega", omega, "1/s") * max(
-        0.0, as_number("time_to_touchdown", time_to_touchdown, "s")
-    )
+    dead_zone = as_positive("dead_zone", dead_zone, "m", allow_zero=True)
+    scale = max(0.0, size - dead_zone) / (size or 1.0)
+    time = max(0.0, as_number("time_to_touchdown", time_to_touchdown, "s"))
+    exponent = as_positive("omega", omega, "1/s") * time
     return read_only(scale * np.exp(min(exponent, _MAX_EXPONENT)) * error)
 
 
-class Walking(Protocol):
-    """A walk, such as `Walk`, that needs a foothold."""
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-
-    @property
-    def options(self) -> WalkOptions:
-        """Options that do not change."""
-
-    @property
-    def gait(self) -> Gait:
-        """The contact schedule."""
-
-    @property
-    def omega(self) -> float:
-        """Natural frequency of the pendulum [1/s]."""
-
-    def path_at(self, t: float) -> Path:
-        """Predict the path of the body at t [s]."""
-
-    def nominal_foothold(self, foot: str, t: float) -> Array:
-        """Return where a foot would stand below the body at t [s], shape (2,) [m]."""
-
-
-def raibert_foothold(foot: str, touchdown: float, walk: Walking) -> Array:
+def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     """Compute the default foothold of a `Walk`: the neutral point of the foot on the body's path.
 
     Where the body turns, the velocity is that of the foot's nominal position. The foothold also

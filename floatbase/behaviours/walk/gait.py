@@ -339,12 +339,9 @@ class Gait(Value):
         t, first_lift_off = as_number("t", t, "s"), self._first_lift_off(foot)
         cycles = floor((t + TIME_TOLERANCE - first_lift_off) / self.period)
         lift_off = first_lift_off + cycles * self.period
-        swinging = (
-            cycles >= 0
-            and t < lift_off + self.swing - TIME_TOLERANCE
-            and self._allows_lift_off(lift_off)
-        )
-        return (lift_off, lift_off + self.swing) if swinging else None
+        touchdown = lift_off + self.swing
+        swinging = cycles >= 0 and t < touchdown - TIME_TOLERANCE
+        return (lift_off, touchdown) if swinging and self._allows_lift_off(lift_off) else None
 
     def stance(self, t: float) -> tuple[str, ...]:
         """Return the feet that stand at a given time.
@@ -433,16 +430,11 @@ class Gait(Value):
         if as_number("t", t, "s") <= self.start:
             return self
         almost_one = 1.0 - TIME_TOLERANCE / self.period
-        offsets = {
-            foot: (self._first_lift_off(foot) - t) / self.period % 1.0 for foot in self.offsets
-        }
-        return replace(
-            self,
-            offsets={
-                foot: 0.0 if offset >= almost_one else offset for foot, offset in offsets.items()
-            },
-            start=t,
-        )
+        offsets = dict(self.offsets)
+        for foot in offsets:
+            offset = (self._first_lift_off(foot) - t) / self.period % 1.0
+            offsets[foot] = 0.0 if offset >= almost_one else offset
+        return replace(self, offsets=offsets, start=t)
 
     def _allows_lift_off(self, time: float) -> bool:
         """Return whether feet may lift off at a time [s]."""

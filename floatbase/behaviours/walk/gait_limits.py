@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
-from math import pi, sqrt
-from typing import Protocol
+from math import atan2, cos, pi, sin, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +19,9 @@ from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import joint_limits
+
+if TYPE_CHECKING:
+    from floatbase.behaviours.walk.walk import Walk
 
 # with four feet or fewer, the middle of all feet is at the edge of each smaller stance
 MAX_FEET_WITH_SWAY = 4
@@ -70,23 +73,7 @@ def speed_fractions(
     return min(first_fraction, fraction), fraction
 
 
-class _Walking(Protocol):
-    """A walk: its robot and its desired motion."""
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-
-    @property
-    def velocity(self) -> Array:
-        """Desired velocity, shape (2,) [m/s]."""
-
-    @property
-    def yaw_rate(self) -> float:
-        """Desired yaw rate [rad/s]."""
-
-
-def motion_message(walk: _Walking, gait: Gait, state: State, fraction: float) -> str:
+def motion_message(walk: Walk, gait: Gait, state: State, fraction: float) -> str:
     """Return the warning for a walk that does not move as desired, else "".
 
     Either its legs cannot move the feet along the desired velocity, as solo8's to the side, or it
@@ -94,11 +81,8 @@ def motion_message(walk: _Walking, gait: Gait, state: State, fraction: float) ->
     """
     direction = np.append(walk.velocity, 0.0) / (np.linalg.norm(walk.velocity) or 1.0)
     jacobians = {foot: state.frame_jacobian(foot)[:3, 6:] for foot in gait.feet}
-    stuck = [
-        foot
-        for foot, J in jacobians.items()
-        if np.linalg.norm(direction - J @ (np.linalg.pinv(J) @ direction)) > _MAX_SIDEWAYS
-    ]
+    sideways = {f: direction - J @ (np.linalg.pinv(J) @ direction) for f, J in jacobians.items()}
+    stuck = [foot for foot, part in sideways.items() if np.linalg.norm(part) > _MAX_SIDEWAYS]
     if stuck:
         return (
             f"{walk!r} hardly moves in this direction, because the legs of {', '.join(stuck)} "
@@ -152,7 +136,8 @@ def _leg_reach(state: State, foot: str, direction: Array) -> float:
     The result is the smaller of the two distances from the foot's place in the standing posture.
     """
     root = leg_joints(state.robot, foot)[-1]
-    leg = state.point(foot) - state.joint_transforms[root][:3, 3]
+    centre = state.point(foot, state.robot.foot(foot).centre)
+    leg = centre - state.joint_transforms[root][:3, 3]
     along = abs(float(leg[:2] @ direction))
     square = _leg_length(state.robot, foot) ** 2 - float(leg @ leg) + along**2
     return sqrt(max(square, 0.0)) - along
@@ -186,21 +171,27 @@ def _longest_leg(robot: Robot, foot: str, limits: Mapping[int, tuple[float, floa
     """
     model, data, frame = robot.model, robot.model.createData(), robot.frame_id(foot)
     leg, q = leg_joints(robot, foot), np.array(robot.standing().q)
+    centre = np.array(robot.foot(foot).centre)
 
-    def distance(i: int, position: float) -> float:
-        q[i] = position
+    def distance(joint: int, position: float) -> float:
+        place(joint, position)
         pin.forwardKinematics(model, data, q)
-        place = pin.updateFramePlacement(model, data, frame).translation
-        return float(np.linalg.norm(place - data.oMi[leg[-1]].translation))
+        end = pin.updateFramePlacement(model, data, frame).act(centre)
+        return float(np.linalg.norm(end - data.oMi[leg[-1]].translation))
+
+    def place(joint: int, position: float) -> None:
+        is_unlimited = model.nqs[joint] == 2  # stored as (cos, sin)
+        values = (cos(position), sin(position)) if is_unlimited else position
+        q[model.idx_qs[joint] :][: model.nqs[joint]] = values
 
     longest = 0.0
     for joint in leg * _SWEEPS:
-        i = model.idx_qs[joint]
-        if model.nqs[joint] > 1:  # (cos, sin) of a joint without limits
-            continue
-        lower, upper = limits.get(joint, (q[i] - pi, q[i] + pi))
-        positions = [q[i], *np.linspace(max(lower, q[i] - pi), min(upper, q[i] + pi), _GRID_SIZE)]
-        longest, q[i] = max((distance(i, position), position) for position in positions)
+        now = q[model.idx_qs[joint] :][: model.nqs[joint]]
+        x = float(now[0]) if len(now) == 1 else atan2(now[1], now[0])
+        lower, upper = limits.get(joint, (x - pi, x + pi))
+        positions = [x, *np.linspace(max(lower, x - pi), min(upper, x + pi), _GRID_SIZE)]
+        longest, best = max((distance(joint, position), position) for position in positions)
+        place(joint, best)
     return longest
 
 
@@ -215,22 +206,13 @@ def required_friction(gait: Gait, posture: WalkingPosture) -> float:
     """
     if len(posture.contacts) > MAX_FEET_WITH_SWAY or set(gait.feet) != set(posture.contacts.names):
         return 0.0
-    lift_offs = sorted(gait.offsets.values())
-    times = sorted(
-        {
-            round((offset + fraction) % 1.0, 9)
-            for offset in lift_offs
-            for fraction in (0.0, gait.swing / gait.period)
-        }
-    )
+    lift_offs = list(gait.offsets.values())
+    touchdowns = [offset + gait.swing / gait.period for offset in lift_offs]
+    times = sorted({round(time % 1.0, 9) for time in lift_offs + touchdowns})
     begin = gait.start + 2.0 * gait.period
     stances = [gait.stance(begin + time * gait.period) for time in (*times, 1.0 + times[0])]
-    centres = [
-        np.mean(
-            [posture.foot_centre(foot, posture.state.point(foot), 0.0) for foot in stance], axis=0
-        )
-        for stance in stances
-    ]
+    at = {foot: posture.foot_centre(foot, posture.state.point(foot), 0.0) for foot in gait.feet}
+    centres = [np.mean([at[foot] for foot in stance], axis=0) for stance in stances]
     distances = [
         float(np.linalg.norm(b - a)) / 2.0
         for (a, b), (first, second) in zip(pairwise(centres), pairwise(stances), strict=True)

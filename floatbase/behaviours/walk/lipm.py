@@ -106,9 +106,8 @@ class LIPM(Value):
                     f"A segment of the ZMP goes from {begin:g} to {end:g} s. Each segment must end "
                     f"later than it begins, and begin where the one before ends."
                 )
-            segments.append(
-                (begin, end, as_array("ZMP", p0, (2,), "m"), as_array("ZMP", p1, (2,), "m"))
-            )
+            p0, p1 = (as_array("ZMP", p, (2,), "m") for p in (p0, p1))
+            segments.append((begin, end, p0, p1))
         length = segments[-1][1] - segments[0][0]
         if self.omega * length > _MAX_EXPONENT:
             raise InputError(
@@ -134,12 +133,9 @@ class LIPM(Value):
         acceleration : ndarray, shape (2,)
             Acceleration in the world frame [m/s²].
         """
-        p, slope, a, b = self._evaluate(t)
-        return (
-            read_only(p + a + b),
-            read_only(slope + self.omega * (a - b)),
-            read_only(self.omega**2 * (a + b)),
-        )
+        (p, slope, a, b), omega = self._evaluate(t), self.omega
+        x, v = read_only(p + a + b), read_only(slope + omega * (a - b))
+        return x, v, read_only(omega**2 * (a + b))
 
     def dcm(self, t: float) -> Array:
         """Compute the divergent component of motion ξ = c + ċ / ω at a given time.
@@ -212,9 +208,7 @@ class LIPM(Value):
         Before the first segment, the values are those at the segment's beginning.
         """
         t = max(as_number("t", t, "s"), self.segments[0][0])
-        begin, p0, slope, a, b = next(
-            solution for solution in reversed(self._closed_form) if solution[0] <= t
-        )
+        begin, p0, slope, a, b = next(s for s in reversed(self._closed_form) if s[0] <= t)
         # beyond the last segment a is 0
         growth = np.exp(min(self.omega * (t - begin), _MAX_EXPONENT))
         return p0 + slope * (t - begin), slope, a * growth, b / growth

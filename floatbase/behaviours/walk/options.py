@@ -81,11 +81,10 @@ class Gains(Value):
         Gains
             Gains for flat feet if any contact is a flat foot, otherwise for point feet.
         """
-        flat = flat_foot_names(as_instance("contacts", contacts, Contacts))
-        return (
-            Gains(com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2))
-            if flat
-            else Gains()
+        if not flat_foot_names(as_instance("contacts", contacts, Contacts)):
+            return Gains()
+        return Gains(
+            com=(25.0, 10.0), base=(100.0, 100.0), swing=(400.0, 10.0), posture=(100.0, 1e-2)
         )
 
 
@@ -164,11 +163,7 @@ def flat_foot_names(contacts: Contacts) -> set[str]:
 
 def check_options(behaviour: str, options: Iterable[str]) -> None:
     """Raise `InputError` for an option that `WholeBodyController` does not have."""
-    known = [
-        name
-        for name in inspect.signature(WholeBodyController).parameters
-        if name not in ("robot", "contacts", "tasks")
-    ]
+    _, _, _, *known = inspect.signature(WholeBodyController).parameters  # robot, contacts, tasks
     for name in options:
         if name not in known:
             raise InputError(

@@ -42,13 +42,8 @@ class Path:
         ramp = np.minimum(duration, np.abs(change) / desired.acceleration)  # s, of each part
         velocity = self.velocity + np.sign(change) * desired.acceleration * ramp
         displacement = (self.velocity + velocity) / 2.0 * ramp + velocity * (duration - ramp)
-        heading = self.yaw + displacement[2] / 2.0
-        return Path(
-            t,
-            self.position + rotated_by_yaw(displacement[:2], heading),
-            self.yaw + float(displacement[2]),
-            velocity,
-        )
+        heading, yaw = self.yaw + displacement[2] / 2.0, self.yaw + float(displacement[2])
+        return Path(t, self.position + rotated_by_yaw(displacement[:2], heading), yaw, velocity)
 
     def point(self, offset: Array) -> Array:
         """Return a point, shape (2,) [m], that has an offset, (2,), from the path in its frame."""

@@ -197,31 +197,22 @@ def make_plan(
         if previous and foot in (swings or {}) and foot not in stance:
             planned[foot] = replace(previous.planned_swings[foot], path=(swings or {})[foot])
         elif times:
-            yaws = _nearest_yaws(_foot_yaw(posture, state, foot), yaw_at(times[1]))
-            planned[foot] = _planned_swing(
-                posture, options, state.point(foot), foot, footholds[foot], times, yaws
+            yaws, start = (
+                _nearest_yaws(_foot_yaw(posture, state, foot), yaw_at(times[1])),
+                state.point(foot),
             )
-    ramps = {
-        foot: (
-            footing.touchdowns.get(foot, -inf) >= begin - TIME_TOLERANCE,
-            foot in gait.feet
-            and interval[1] < inf
-            and gait.swing_at(foot, interval[1] + TIME_TOLERANCE) is not None,
-        )
-        for foot in posture.contacts.names
-    }
+            planned[foot] = _planned_swing(
+                posture, options, start, foot, footholds[foot], times, yaws
+            )
+    ramps, end = {}, interval[1] + TIME_TOLERANCE
+    for foot in posture.contacts.names:
+        landed = footing.touchdowns.get(foot, -inf) >= begin - TIME_TOLERANCE
+        lifts = foot in gait.feet and end < inf and gait.swing_at(foot, end) is not None
+        ramps[foot] = landed, lifts
+    positions = {foot: foothold.position for foot, foothold in footholds.items()}
+    replan = until - WEIGHT_SHIFT_TIME if endless else inf
     return StepPlan(
-        t,
-        stance,
-        footing,
-        {foot: each.position for foot, each in footholds.items()},
-        lipm,
-        planned,
-        path,
-        ground,
-        interval,
-        until - WEIGHT_SHIFT_TIME if endless else inf,
-        ramps,
+        t, stance, footing, positions, lipm, planned, path, ground, interval, replan, ramps
     )
 
 
@@ -231,14 +222,13 @@ def weight_shift(posture: WalkingPosture, state: State, t: float, gait: Gait) ->
     The delay is 0 if the capture point is above the feet that stand at the first lift-off, or if
     only two points stand then: such a gait is kept in balance by its steps.
     """
-    swings = {foot: gait.next_swing(foot, t) for foot in gait.feet}
-    first = min((times[0] for times in swings.values() if times), default=inf)
+    swings = [(foot, gait.next_swing(foot, t)) for foot in gait.feet]
+    lift_offs = {foot: times[0] for foot, times in swings if times}
+    first = min(lift_offs.values(), default=inf)
     delay = t + WEIGHT_SHIFT_TIME - first
     if delay <= TIME_TOLERANCE:
         return 0.0
-    swinging = [
-        foot for foot, times in swings.items() if times and times[0] <= first + TIME_TOLERANCE
-    ]
+    swinging = [foot for foot, time in lift_offs.items() if time <= first + TIME_TOLERANCE]
     points = posture.contacts.without(*swinging).positions(state)
     if len(points) <= 2:
         return 0.0
@@ -364,15 +354,11 @@ def _zmp_segments(
         elif end - begin <= WEIGHT_SHIFT_TIME:
             segments.append((begin, end, zmp, goal))
         elif last:  # move to the middle, then stay
-            segments += [
-                (begin, begin + WEIGHT_SHIFT_TIME, zmp, goal),
-                (begin + WEIGHT_SHIFT_TIME, end, goal, goal),
-            ]
+            shifted = begin + WEIGHT_SHIFT_TIME
+            segments += [(begin, shifted, zmp, goal), (shifted, end, goal, goal)]
         else:  # stay, then shift before the foot lifts off
-            segments += [
-                (begin, end - WEIGHT_SHIFT_TIME, zmp, zmp),
-                (end - WEIGHT_SHIFT_TIME, end, zmp, goal),
-            ]
+            shift = end - WEIGHT_SHIFT_TIME
+            segments += [(begin, shift, zmp, zmp), (shift, end, zmp, goal)]
         zmp = goal
     return segments
 

@@ -27,12 +27,9 @@ class WalkingPosture:
         self.flat_feet = flat_foot_names(contacts)
         self._centre_offsets = {name: self._centre_offset(name) for name in contacts.names}
         positions = {name: state.point(name) for name in contacts.names}
-        centre = np.mean(
-            [self.foot_centre(name, position, 0.0) for name, position in positions.items()], axis=0
-        )
-        self.nominal_feet = {
-            name: position - [*centre, 0.0] for name, position in positions.items()
-        }
+        centres = [self.foot_centre(name, position, 0.0) for name, position in positions.items()]
+        middle = [*np.mean(centres, axis=0), 0.0]
+        self.nominal_feet = {name: position - middle for name, position in positions.items()}
         self.ground_height = float(contacts.positions(state)[:, 2].mean())
         self.omega = sqrt(state.robot.gravity / (state.com[2] - self.ground_height))
 

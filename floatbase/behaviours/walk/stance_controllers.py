@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
@@ -45,9 +45,8 @@ class StanceControllers:
         flat = can_keep_flat(robot, tuple(posture.flat_feet))
         self._soft_soles = {} if flat else {"contact_weight": _ROLLING_SOLE_WEIGHT}
         # reports wrong options and tasks
-        self.limits = WholeBodyController(
-            robot, contacts, options.tasks, **options.controller
-        ).limits
+        controller = WholeBodyController(robot, contacts, options.tasks, **options.controller)
+        self.limits = controller.limits
 
     plan: StepPlan | None
 
@@ -64,11 +63,8 @@ class StanceControllers:
     def prepare(self, gait: Gait) -> None:
         """Make the controllers of all stances of a gait, since that takes milliseconds."""
         gait = replace(gait, stop=None)
-        changes = [
-            gait.start + (1.0 + offset) * gait.period + time
-            for offset in gait.offsets.values()
-            for time in (0.0, gait.swing)
-        ]
+        lift_offs = [gait.start + (1.0 + offset) * gait.period for offset in gait.offsets.values()]
+        changes = [lift_off + time for lift_off in lift_offs for time in (0.0, gait.swing)]
         names = self._posture.contacts.names
         for standing in (gait.feet, *(gait.stance(t) for t in changes)):
             self[tuple(name for name in names if name in standing or name not in gait.feet)]
@@ -78,14 +74,12 @@ class StanceControllers:
         controller = self._controllers.get(stance)
         if controller is None:
             robot = self._posture.state.robot
+            torques = self._options.controller.get("torque_limits")
+            joints = JointLimits.of(robot, torque_limits=torques, weight=_JOINT_LIMIT_WEIGHT)
             arguments: dict[str, Any] = {
                 "max_normal_force": self._normal_force_bounds(stance),
                 "on_infeasible": "soften",  # torques and friction may be unable to hold the feet
-                "joint_limits": JointLimits.of(
-                    robot,
-                    torque_limits=self._options.controller.get("torque_limits"),
-                    weight=_JOINT_LIMIT_WEIGHT,
-                ),
+                "joint_limits": joints,
                 **self._soft_soles,
                 **self._options.controller,
             }
@@ -115,9 +109,7 @@ class StanceControllers:
             tasks.append(ForceTask(weight=self._force_weight))
         return [*tasks, *self._options.tasks]
 
-    def _normal_force_bounds(
-        self, stance: Sequence[str]
-    ) -> dict[str, Callable[[float], float]] | None:
+    def _normal_force_bounds(self, stance: Sequence[str]) -> dict[str, Any] | None:
         """Return ramps for the normal force of each point if all feet stand, otherwise None."""
         names = self._posture.contacts.names
         if self._options.ramp == 0.0 or len(stance) < len(names) or len(stance) < 2:

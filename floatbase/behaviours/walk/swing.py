@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._geometry import minimum_jerk
+from floatbase._geometry import bump, minimum_jerk
 from floatbase._validation import Array, Value, as_array, as_number, as_positive, checked, read_only
 from floatbase.errors import InputError
 
@@ -130,17 +130,9 @@ class Swing(Value):
         """
         T = self.touchdown - self.lift_off
         u = min(max((as_number("t", t, "s") - self.lift_off) / T, 0.0), 1.0)
-        w = u * (1.0 - u)
-        fraction, rate, acceleration = minimum_jerk(u)
-        path_derivatives = fraction, rate / T, acceleration / T**2
-        height_derivatives = (
-            64.0 * w**3,
-            192.0 * w * w * (1.0 - 2.0 * u) / T,
-            384.0 * w * (1.0 - 5.0 * w) / T**2,
-        )
         displacement, up = self.end - self.start, np.array([0.0, 0.0, self.height])
         x, v, a = (
-            s * displacement + b * up
-            for s, b in zip(path_derivatives, height_derivatives, strict=True)
+            path / scale * displacement + height / scale * up
+            for path, height, scale in zip(minimum_jerk(u), bump(u), (1.0, T, T**2), strict=True)
         )
         return read_only(self.start + x), read_only(v), read_only(a)

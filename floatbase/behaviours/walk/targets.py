@@ -95,9 +95,8 @@ def adjusted_ends(
         time_left = swing.path.touchdown - t
         shift = step_adjustment(error, time_left, posture.omega, zone)
         com_at_touchdown = com[:2] + com_velocity[:2] * time_left
-        end = posture.clamp_to_reach(
-            foot, swing.planned_end[:2] + shift, com_at_touchdown, path.yaw, reach
-        )
+        end: Array = swing.planned_end[:2] + shift
+        end = posture.clamp_to_reach(foot, end, com_at_touchdown, path.yaw, reach)
         ends[foot] = posture.on_ground(foot, end, swing.ground)
     return ends
 
@@ -122,11 +121,8 @@ def base_target(posture: WalkingPosture, pose: BodyPose, path: Path, t: float) -
     pitched = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ posture.rotation("base")
     yaw = rotation_z(path.yaw)
     forwards, left = yaw[:, 0], yaw[:, 1]
-    return (
-        yaw @ pitched,
-        rate * left + turning * _UP,
-        acceleration * left - rate * turning * forwards,
-    )
+    angular_acceleration = acceleration * left - rate * turning * forwards
+    return yaw @ pitched, rate * left + turning * _UP, angular_acceleration
 
 
 def foot_rotation_target(
