@@ -91,20 +91,14 @@ def _random_state(robot: fb.Robot, rng: Any, violent: bool) -> tuple[Any, Any]:
 
 
 def _answer(made: fb.WholeBodyController, q: Any, v: Any) -> tuple[int, list[Any]]:
-    """Number of active rows or code, and q, v, Pinocchio's quantities, torques, active rows."""
+    """Number of active rows or code, and q, v, torques, active rows."""
     compiled = made.compiled
     assert compiled is not None
-    inputs, robot = compiled.default_inputs, made.robot
-    result = compiled.empty_result(inputs)
-    result[:] = 0.0
-    with compiled.dynamics.lock:
-        compiled.dynamics.update(q, v)
-        M, h, J, Ag, oMi = (np.array(view) for view in compiled.dynamics.views)
-        count = tick.tick(q, v, inputs.packed, *compiled.arguments, result, tick.N_STAGES)
+    robot = made.robot
+    result, count = compiled.run(q, v, compiled.default_inputs, tick.N_STAGES)
     first = robot.nv + robot.d + made.contacts.k + robot.nv + made.contacts.k
     active = np.sort(result[first : first + max(count, 0)])
-    matrices = [M.ravel("F"), h, J.ravel("F"), Ag.ravel("F"), oMi.ravel()]
-    return count, [q, v, *matrices, result[compiled.tau], active]
+    return count, [q, v, result[compiled.tau], active]
 
 
 def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[str, Any]:

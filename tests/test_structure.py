@@ -43,6 +43,7 @@ ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
 # numba loads with them, so no __init__ imports them
 COMPILED = {
     "floatbase.behaviours.walk.compiled_targets",
+    "floatbase.control.tick.dynamics",
     "floatbase.control.tick.jit",
     "floatbase.control.tick.tick",
 }

@@ -23,7 +23,7 @@ from floatbase._validation import (
 from floatbase.control.command import Command
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
-from floatbase.control.problem import ModifyQP, Problem, dry_run
+from floatbase.control.problem import ModifyQP, Problem, assumed_model, dry_run
 from floatbase.control.soft import (
     SOFT_CONTACT_WEIGHT,
     SOFT_LIMIT_WEIGHT,
@@ -117,7 +117,8 @@ class WholeBodyController:
         control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
         `EquationsOfMotion` at that state. It can add constraints that couple q̈, τ and λ, relax or
         scale rows of eq. (7), or change the objective. It must return a QP in the same x, such as
-        `dataclasses.replace(qp, H=..., g=...)`. Only the reference backend supports it.
+        `dataclasses.replace(qp, H=..., g=...)`. Only the reference backend supports it, except for
+        a `floatbase.playground.ModelMismatch`.
     solver : str, optional
         QP solver, one of `floatbase.qp.solvers()`.
     backend : {"auto", "compiled", "reference"}, optional
@@ -228,7 +229,7 @@ class WholeBodyController:
         self._settings = settings
         if settings.backend == "reference":
             reason = "it was requested"
-        elif problem.modify_qp is not None:
+        elif assumed_model(problem) is None:
             reason = "modify_qp changes the QP"
         elif problem.level_sizes:
             reason = "the tasks have strict priorities"

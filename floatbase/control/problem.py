@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
-from typing import TypeAlias, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -49,6 +49,22 @@ Costs: TypeAlias = Sequence[tuple[Block, float, Affine]]  # block, weight and re
 _TASK_ATTRIBUTES = ("block", "name", "weight", "residual")
 # m/s²: contact rows that disagree by less do so because Jacobians and drifts are rounded
 INCONSISTENCY_TOLERANCE = 1e-6
+
+
+class AssumedModel(NamedTuple):
+    """What a controller assumes instead of eqs. (5), (7) and (28), by default nothing else.
+
+    A `modify_qp` runs compiled if its own class has `compiled_as = "assumed model"`, and these
+    attributes.
+    """
+
+    mass: float = 1.0  # multiple of M and h
+    gravity: float = 1.0  # multiple of the part of h that does not depend on the velocity
+    velocity_forces: float = 1.0  # multiple of the other part of h
+    drift: float = 1.0  # multiple of b
+    ignored_contacts: Sequence[str] = ()  # contacts whose forces are missing from (7)
+    underactuated: bool = True  # whether the base's rows of (7) hold
+    cones: bool = True  # whether friction and minimum normal forces are constraints
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,16 +174,7 @@ class Problem(Value):
             return self.solve_levels(state, t)[-1].qp
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
-        qp = build_qp(eom, self.tasks, self.limits, t)
-        if self.modify_qp is None:
-            return qp
-        modified = as_instance("the result of modify_qp", self.modify_qp(qp, eom), QP)
-        if modified.blocks != qp.blocks:
-            raise InputError(
-                f"modify_qp changed the blocks of x from {dict(qp.blocks)} to "
-                f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
-            )
-        return modified
+        return modified_qp(self, build_qp(eom, self.tasks, self.limits, t), eom)
 
     def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
         """Solve the QPs of all priority levels at a state and a time.
@@ -291,6 +298,28 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
     return assemble_qp(eom, costs, limits, limits.hard_normal_forces(eom.contacts, t), inequalities)
+
+
+def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
+    """Apply the `modify_qp` of a problem to its QP at a state."""
+    if problem.modify_qp is None:
+        return qp
+    modified = as_instance("the result of modify_qp", problem.modify_qp(qp, eom), QP)
+    if modified.blocks != qp.blocks:
+        raise InputError(
+            f"modify_qp changed the blocks of x from {dict(qp.blocks)} to "
+            f"{dict(modified.blocks)}. It must keep x = (q̈, τ, λ)."
+        )
+    return modified
+
+
+def assumed_model(problem: Problem) -> AssumedModel | None:
+    """Return the model that a problem assumes, or None if its `modify_qp` is anything else."""
+    change = problem.modify_qp
+    if change is None:
+        return AssumedModel()
+    is_compiled = vars(type(change)).get("compiled_as") == "assumed model"
+    return cast(AssumedModel, change) if is_compiled else None
 
 
 def assemble_qp(

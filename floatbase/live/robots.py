@@ -18,7 +18,7 @@ import numpy as np
 from floatbase._validation import Array
 from floatbase.behaviours import WEIGHT_SHIFT_TIME, Gait, Walk
 from floatbase.control import JointLimits, WholeBodyController
-from floatbase.control.tick import CompiledTick, tick
+from floatbase.control.tick import CompiledTick, dynamics, tick
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.live.settings import SETTINGS
@@ -163,8 +163,10 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         "parameters": {
             "mu": _friction_places(packed_with, MU),
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
-            # the tables begin with a counter and the mass of joint 0, the world, and its position
-            "baseMass": 1 + 4,
+            # the tables begin with `Model.terms` and the links, of which the first is the world
+            "gravity": 2,
+            "velocityForces": dynamics.VELOCITY_FACTOR,
+            "baseMass": dynamics.N_TERMS + (dynamics.MASS + 1) + dynamics.MASS,
         },
     }
 

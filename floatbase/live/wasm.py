@@ -130,7 +130,8 @@ def _tick_arguments() -> tuple[Any, ...]:
         np.array(robot.standing().q),
         np.zeros(robot.nv),
         inputs.packed,
-        *compiled.arguments,
+        *compiled.tables,
+        *compiled.workspace(),
         compiled.empty_result(inputs),
         tick.N_STAGES,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -51,6 +52,7 @@ class ModelMismatch(Value):
     >>> controller = fb.WholeBodyController(robot, contacts, tasks, modify_qp=mismatch)
     """
 
+    compiled_as: ClassVar[str] = "assumed model"
     mass: float = field(default=1.0, metadata=checked(as_positive))
     gravity: bool = field(default=True, metadata=checked(as_bool))
     velocity_forces: bool = field(default=True, metadata=checked(as_bool))

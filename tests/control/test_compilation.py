@@ -94,15 +94,6 @@ def test_without_numba_the_reference_backend_answers_and_says_why(obstacle, envi
     assert re.match(f'backend="compiled" is not possible: {reason}. backend="auto"', said[1])
 
 
-def test_another_layout_of_pinocchios_results_leaves_the_reference_backend(monkeypatch):
-    # a robot of this test alone, since the result is cached for each robot
-    robot = fb.load("go2", torque_limits=20.0)
-    monkeypatch.setattr(type(tick_of(judges.load("go2")).dynamics), "layout_supported", False)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), [])
-    assert controller.backend == "reference"
-    assert "Pinocchio" in controller.backend_reason
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
 @pytest.mark.parametrize("backend", ["compiled", "reference"])
@@ -377,7 +368,7 @@ def test_where_numba_fails_the_reference_backend_is_the_last_resort(monkeypatch)
 def test_a_tick_reads_nothing_of_its_workspace_that_it_did_not_write(name):
     robot = judges.load(name)
     compiled = tick_of(robot)
-    floats, ints = compiled.workspace
+    floats, ints = compiled.workspace()
     answered = 0
     for seed in range(20):
         state = robot.random_state(seed, 0.3)
@@ -402,9 +393,10 @@ def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_sm
     assert compiled(q, v, 0.0) is not None
     assert rtsys.get_allocation_stats() == before
     counts.memsys_disable_stats()
-    compiled.workspace[0].resize(2000, refcheck=False)
+    inputs, ints = compiled.default_inputs, compiled.workspace()[1]
+    small, result = np.empty(2000), compiled.empty_result(inputs)
     with raises(MemoryError, "workspace"):
-        compiled(q, v, 0.0)
+        tick.tick(q, v, inputs.packed, *compiled.tables, small, ints, result, tick.N_STAGES)
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])

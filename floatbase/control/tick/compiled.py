@@ -9,14 +9,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
-from threading import Event, Thread
+from threading import Event, Thread, local
 
 import numpy as np
 
 from floatbase._validation import Array
 from floatbase.control.limits import force_rows, hard_maximum
-from floatbase.control.problem import Problem, assemble_qp, residual_of
-from floatbase.control.tick.problem_arrays import Indices, dynamics_of, pack_problem
+from floatbase.control.problem import Problem, assemble_qp, modified_qp, residual_of
+from floatbase.control.tick.problem_arrays import HAS_CONES, Indices, pack_problem
 from floatbase.control.tick.targets import TargetLayout, task_kind
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
@@ -99,11 +99,6 @@ def _unsupported_robot_reason(robot: Robot) -> str:
     """Return why a robot cannot run compiled, or ""."""
     if robot.d == 0:
         return f"{robot.name} has no driven joints"
-    if robot.nv == 1:  # Pinocchio drops one dimension of its Jacobians
-        return (
-            f"{robot.name} has a single joint and no floating base, but the compiled controller "
-            f"needs at least two velocities"
-        )
     for i, joint in enumerate(robot.model.joints):
         kind = joint.shortname()
         if i and (not kind.startswith(_JOINTS) or (kind == "JointModelFreeFlyer" and i != 1)):
@@ -111,11 +106,16 @@ def _unsupported_robot_reason(robot: Robot) -> str:
                 f"joint {robot.model.names[i]!r} is a {kind}, but the compiled controller supports "
                 f"only revolute and prismatic joints"
             )
-    return (
-        ""
-        if dynamics_of(robot).layout_supported
-        else "this version of Pinocchio has an unsupported memory layout"
-    )
+    return ""
+
+
+class _Memory(local):
+    """Workspaces of one thread, for the ticks of all its controllers."""
+
+    arrays = np.empty(0), np.empty(0, np.int64)
+
+
+_memory = _Memory()
 
 
 class CompiledTick:
@@ -125,9 +125,9 @@ class CompiledTick:
         from floatbase.control.tick import dual_search, tick
 
         robot, nv, d, k = problem.robot, problem.robot.nv, problem.robot.d, problem.contacts.k
-        self._problem, self.dynamics = problem, dynamics_of(robot)
+        self._problem = problem
         self.layout, self.infeasible = TargetLayout(problem), dual_search.INFEASIBLE
-        tables = pack_problem(problem, self.layout)
+        self.tables = pack_problem(problem, self.layout)
         self.user_terms = UserTerms(problem)
         time_varying = {each.task_index for each in self.layout.tasks if each.task.is_time_varying}
         self.unchecked_tasks = [
@@ -141,11 +141,9 @@ class CompiledTick:
         self._n_multipliers = nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
         self._workspace_sizes = tick.workspace_sizes
-        self._tables = tables
         self._tick = tick.tick
         self._n_stages = tick.N_STAGES
         self._varies = self.layout.varies or self.user_terms.varies
-        self._n_user_rows = -1
         limits = problem.limits
         inequalities = limits.all_inequalities(problem.contacts)
         joint_limits = limits.joint_limits
@@ -156,18 +154,21 @@ class CompiledTick:
         self._has_soft = np.isfinite(min(self._soft_weights, default=np.inf)) or (
             joint_weight is not None
         )
-        self._make_workspace(0)
+        self._sizes = self._workspace_sizes(self.tables[0], 0)
 
-    def _make_workspace(self, n_user_rows: int) -> None:
-        """Provide memory for one tick at a time, with this many rows of user-defined tasks.
+    def workspace(self, n_user_rows: int = 0) -> tuple[Array, Indices]:
+        """Return this thread's memory for one tick, with as many rows of user-defined tasks."""
+        sizes = self._workspace_sizes(self.tables[0], n_user_rows) if n_user_rows else self._sizes
+        floats, ints = _memory.arrays
+        if floats.size < sizes[0] or ints.size < sizes[1]:
+            floats, ints = _memory.arrays = np.empty(sizes[0]), np.empty(sizes[1], np.int64)
+        return floats, ints
 
-        The lock of the dynamics ensures that only one tick runs at a time.
-        """
-        if n_user_rows > self._n_user_rows:
-            n_floats, n_ints = self._workspace_sizes(self._tables[0], n_user_rows)
-            self.workspace = (np.empty(n_floats), np.empty(n_ints, np.int64))
-            self._n_user_rows = n_user_rows
-            self.arguments = *self.dynamics.views, *self._tables, *self.workspace
+    def run(self, q: Array, v: Array, inputs: TickInputs, n_stages: int) -> tuple[Array, int]:
+        """Run the first stages of one tick; return its numbers, and the number of active rows."""
+        result, workspace = self.empty_result(inputs), self.workspace(inputs.n_user_rows)
+        n_active = self._tick(q, v, inputs.packed, *self.tables, *workspace, result, n_stages)
+        return result, n_active
 
     def __call__(
         self, q: Array, v: Array, t: float, targets: Array | None = None
@@ -180,10 +181,7 @@ class CompiledTick:
             inputs = self.inputs_at(q, v, t, targets)
         if inputs is None:
             return None
-        dynamics, result = self.dynamics, self.empty_result(inputs)
-        with dynamics.lock:
-            dynamics.update(q, v)
-            n_active = self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
+        result, n_active = self.run(q, v, inputs, self._n_stages)
         decided = n_active >= 0 or n_active == self.infeasible
         return (result, n_active, inputs) if decided else None
 
@@ -219,11 +217,8 @@ class CompiledTick:
     def _tick_standing(self) -> None:
         """Run one tick at the robot's standing state."""
         standing = self._problem.robot.standing()
-        q, v, inputs = np.array(standing.q), np.array(standing.v), self.default_inputs
-        result = self.empty_result(inputs)
-        with self.dynamics.lock:
-            self.dynamics.update(q, v)
-            self._tick(q, v, inputs.packed, *self.arguments, result, self._n_stages)
+        q, v = np.array(standing.q), np.array(standing.v)
+        self.run(q, v, self.default_inputs, self._n_stages)
 
     def empty_result(self, inputs: TickInputs) -> Array:
         """Return an uninitialized array for the numbers of one tick."""
@@ -245,9 +240,10 @@ class CompiledTick:
                 else (task.weight, residual_of(task, eom, t))
             )
             costs.append((task.block, *weight_and_residual))
-        return assemble_qp(
+        qp = assemble_qp(
             eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities
         )
+        return modified_qp(self._problem, qp, eom)
 
     def pack(self, problem: Problem) -> tuple[Indices, Indices, Array]:
         """Return a problem with the same tasks as arrays for the tick: sizes, integers, floats."""
@@ -279,7 +275,7 @@ class CompiledTick:
             if limits.joint_limits is None
             else limits.joint_limits.bounded.ravel()
         )
-        friction = np.full(contacts.n_points * (limits.facets + 1), True)
+        friction = np.full(contacts.n_points * (limits.facets + 1), self.tables[0][HAS_CONES] == 1)
         group_sizes = [len(h) for _, h in inputs.inequalities]
         has_row = np.concatenate(
             [
@@ -312,10 +308,6 @@ class CompiledTick:
         try:
             if targets is None:
                 targets = self.layout.at(t) if self.layout.varies else self.layout.constant
-            inputs = self.user_terms.inputs(targets, q, v, t)
+            return self.user_terms.inputs(targets, q, v, t)
         except Exception:  # user code may raise anything
             return None
-        if inputs.n_user_rows > self._n_user_rows:
-            with self.dynamics.lock:
-                self._make_workspace(inputs.n_user_rows)
-        return inputs

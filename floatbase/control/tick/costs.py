@@ -6,15 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from floatbase.control.tick.dynamics import Bodies, centre_of_mass, point_velocity
 from floatbase.control.tick.elimination import Parametrisation, add_entry, add_product
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.kinematics import (
-    Bodies,
-    body_jacobian,
-    centre_of_mass,
-    frame_pose,
-    point_velocity,
-)
+from floatbase.control.tick.kinematics import body_jacobian, frame_pose
 from floatbase.control.tick.problem_arrays import FORCES, QDD, TAU
 from floatbase.control.tick.targets import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
 from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
@@ -84,7 +79,7 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
         e = minus(p, row_part(target, 0, first))
         for r in range(3):
             for c in range(rows.shape[1]):
-                rows[r, c] = bodies.Ag[r, c] / mass
+                rows[r, c] = bodies.Ag[c, r] / mass
     else:
         R, p = frame_pose(bodies, joint, tasks.frames, i)
         if kind == ORIENTATION:

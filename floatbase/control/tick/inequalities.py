@@ -36,6 +36,7 @@ class Inequalities(NamedTuple):
     # hard), G (m, n), h (m,)
     user_start: Any
     n_user_groups: Any  # number of groups
+    has_cones: Any  # whether the controller assumes friction and minimum normal forces
     has_optional: Any  # whether there are any of these, or a maximum normal force
     has_joint_limits: Any
     least: Any  # (d,), bounds of the joint accelerations, rad/s² or m/s²; -inf for none
@@ -71,7 +72,7 @@ def largest_acceleration(gap, v, speed, acceleration, brake, most, dt):
 def joint_bounds(q, v, tree, table, dt, least, largest):
     """Write the bounds of the joint accelerations into least and largest, (d,).
 
-    tree: as in `Bodies`. table: (6, d), lower and upper position limits, speeds, accelerations,
+    tree: as in `Model`. table: (6, d), lower and upper position limits, speeds, accelerations,
     planned and largest decelerations. dt: control period, s.
     """
     d = least.size
@@ -141,7 +142,7 @@ def violated_force_row(limits: Inequalities, forces):
     """
     cones, worst, found = limits.cones, FEASIBILITY_TOLERANCE, -1
     n_rows = limits.facets + 1
-    for i in range(limits.points):
+    for i in range(limits.points if limits.has_cones else 0):
         first, at = i * n_rows, int(cones[i * n_rows, 4])
         f = forces[at], forces[at + 1], forces[at + 2]
         row, excess = worst_facet(limits, first, f)

@@ -69,15 +69,15 @@ def source_digest(folder: Path = Path(__file__).parent) -> int:
     return int.from_bytes(sha256(text).digest()[:7], "big")
 
 
-def jit_cached(make: Callable[[int], Callable[..., Any]]) -> Any:
-    """Compile make(source_digest()), cached on disk if possible.
+def jit_cached(make: Callable[[int], Callable[..., Any]], **options: bool) -> Any:
+    """Compile make(source_digest()) with more options of numba, cached on disk if possible.
 
     The function that `make` returns must use its digest. Code that was compiled beside the source
     is loaded even if no folder is writable.
     """
     global cache_error
     function = make(source_digest())
-    compiled = jit(function)
+    compiled = jit(function, **options)
     if jit_enabled:
         try:
             compiled._cache = _Cache(function)
@@ -163,4 +163,4 @@ def compile_lock(function: Any, *, ahead: bool = False) -> Iterator[None]:
 
 def without_cache(function: Any) -> Any:
     """Compile in memory a function whose compiled code could not be loaded or kept."""
-    return function if function.signatures else jit(function.py_func)
+    return function if function.signatures else jit(function.py_func, nogil=True)

@@ -1,25 +1,22 @@
-"""A problem as plain arrays for the compiled tick, and Pinocchio's results as arrays.
+"""A problem as plain arrays for the compiled tick.
 
-Pinocchio overwrites its arrays in place. The arrays of one robot or one contact are made once, so
-that a controller with other contacts is cheap.
+The arrays of one robot or one contact are made once, so that a controller with other contacts is
+cheap.
 """
 
 from __future__ import annotations
 
-import os
 from functools import lru_cache
-from typing import Any, ClassVar, TypeAlias, cast
-from weakref import WeakSet
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._locks import InterruptibleLock
 from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
-from floatbase.control.problem import Problem
+from floatbase.control.problem import AssumedModel, Problem, assumed_model
 from floatbase.control.tick.targets import TargetLayout
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
@@ -34,62 +31,29 @@ _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 # numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
 N_JOINTS, N_CONTACTS, N_POINTS, N_MOTION_ROWS, N_CONE_ROWS, N_TASKS, N_DRIVEN = range(7)
 N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 12)
-# then 1 or 0: all contacts are points, `Inequalities.has_optional`, there are joint limits
+# then 1 or 0: A and J are equal, `Inequalities.has_optional`, there are joint limits
 POINTS_ONLY, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
+UNDERACTUATED, HAS_CONES = range(15, 17)  # likewise, as in `AssumedModel`
 Indices: TypeAlias = npt.NDArray[np.int64]
 # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
 PolyhedronOptions: TypeAlias = tuple[int, bool, float]
 
 
-class Dynamics:
-    """Pinocchio's results for one robot."""
-
-    _all: ClassVar[WeakSet[Dynamics]] = WeakSet()
-
-    def __init__(self, robot: Robot):
-        self.robot = robot
-        self.data = robot.model.createData()
-        self.lock = InterruptibleLock()
-        self._all.add(self)
-        model, data, n = robot.model, self.data, robot.model.njoints
-        poses = np.lib.stride_tricks.as_strided(
-            data.oMi[0].rotation.T, (n, _POSE_SIZE), (8 * _POSE_SIZE, 8)
-        )
-        self.views: tuple[Array, ...] = (data.M, data.nle, data.J, data.Ag, poses)
-        tree = [
-            (model.parents[i], model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
-            for i in range(n)
-        ]
-        self.tree = np.array(tree, np.int64)
-        self.links = np.array([(link.mass, *link.lever) for link in model.inertias])
-
-    def update(self, q: Array, v: Array) -> None:
-        """Compute the views for a configuration q (nq,) and a velocity v (nv,)."""
-        pin.nonLinearEffects(self.robot.model, self.data, q, v)
-        pin.crba(self.robot.model, self.data, q, pin.Convention.WORLD)
-
-    @property
-    def layout_supported(self) -> bool:
-        """Whether this Pinocchio version has the memory layout that the views assume."""
-        with self.lock:
-            self.update(self.robot.posture, np.linspace(-1.0, 1.0, self.robot.nv))
-            poses, M = np.array([_flat_pose(pose) for pose in self.data.oMi]), self.views[0]
-            return np.array_equal(poses, self.views[-1]) and np.array_equal(M, M.T)
-
-    @classmethod
-    def unlock_all(cls) -> None:
-        """Give every instance a new lock after a fork.
-
-        In a forked process no thread is left to release a lock that another thread held.
-        """
-        for dynamics in cls._all:
-            dynamics.lock = InterruptibleLock()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=Dynamics.unlock_all)
-
-dynamics_of = lru_cache(maxsize=16)(Dynamics)  # one per robot, shared by its controllers
+@lru_cache(maxsize=16)
+def pack_robot(robot: Robot) -> tuple[Indices, tuple[Array, ...]]:
+    """Return the tables of `dynamics.Model`: the tree, then links, joints and armature."""
+    model = robot.model
+    tree, joints, links = [], [], []
+    for i, (joint, link) in enumerate(zip(model.joints, model.inertias, strict=True)):
+        indices = (model.idx_vs[i], model.nvs[i], model.idx_qs[i], model.nqs[i])
+        tree.append((model.parents[i], *indices, joint.shortname().startswith("JointModelP")))
+        data, axis = joint.createData(), np.zeros(3)
+        if joint.nv == 1:
+            joint.calc(data, np.eye(joint.nq)[0])
+            axis = np.ravel(data.S).reshape(2, 3).sum(axis=0)  # linear or angular
+        joints.append([*_flat_pose(model.jointPlacements[i]), *axis])
+        links.append([*link.inertia.ravel(), *link.lever, link.mass])
+    return np.array(tree, np.int64), (np.array(links), np.array(joints), np.array(model.armature))
 
 
 def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indices, Array]:
@@ -100,11 +64,15 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     contacts, frames, points, cones = _pack_contacts(problem)
     cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
     tasks, gains, poses = _pack_tasks(problem, layout)
-    dynamics, limits = dynamics_of(problem.robot), problem.limits
+    (tree, robot_tables), limits = pack_robot(problem.robot), problem.limits
+    assumed = assumed_model(problem) or AssumedModel()
+    gravity = assumed.gravity * np.array(problem.robot.model.gravity.linear)
+    terms = (*gravity, assumed.mass, assumed.velocity_forces, assumed.drift)
+    contacts[:, 6] = [name in assumed.ignored_contacts for name in problem.contacts.names]
     n_inequalities = len(limits.all_inequalities(problem.contacts))
     nv, user_contacts = problem.robot.nv, contacts[contacts[:, 1] == USER_DEFINED]
     sizes = {
-        N_JOINTS: len(dynamics.tree),
+        N_JOINTS: len(tree),
         N_CONTACTS: len(contacts),
         N_POINTS: len(points),
         N_MOTION_ROWS: contacts[:, 4].sum(),
@@ -113,19 +81,20 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         N_DRIVEN: problem.robot.d,
         N_FORCES: problem.contacts.k,
         N_TARGETS: layout.size,
-        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:]),
+        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:6]),
         N_USER_TASKS: len(problem.tasks) - len(tasks),
         N_INEQUALITIES: n_inequalities,
-        POINTS_ONLY: np.all(contacts[:, 1] == POINT),
+        POINTS_ONLY: np.all(contacts[:, 1] == POINT) and not np.any(contacts[:, 6]),
         HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
         HAS_JOINT_LIMITS: limits.joint_limits is not None,
+        UNDERACTUATED: assumed.underactuated,
+        HAS_CONES: assumed.cones,
     }
-    # the first entry is the counter of a workspace
     float_tables = (
-        0.0, dynamics.links, frames, points, gains, poses, cones, limits.torque_limits,
+        terms, *robot_tables, frames, points, gains, poses, cones, limits.torque_limits,
         *_pack_joint_limits(limits.joint_limits, problem.robot.d),
     )  # fmt: skip
-    int_tables = np.concatenate([np.ravel(table) for table in (0, dynamics.tree, contacts, tasks)])
+    int_tables = np.concatenate([np.ravel(table) for table in (tree, contacts, tasks)])
     return (
         np.array([sizes[entry] for entry in range(len(sizes))], np.int64),
         int_tables,
@@ -143,7 +112,7 @@ def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array
 
 
 def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
-    """Return contacts (C, 6), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
+    """Return contacts (C, 7), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
 
     The first three arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
@@ -153,7 +122,7 @@ def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
         for contact in problem.contacts
     ]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
-    tables = np.array(table, np.int64).reshape(-1, 6)
+    tables = np.array(table, np.int64).reshape(-1, 7)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
         np.concatenate([np.zeros((0, width)), *parts])
@@ -171,7 +140,7 @@ def _pack_contact(
     cones: Array = np.zeros((0, 5))
     if isinstance(contact, FrictionContact):
         n, cones = len(contact.point_names), _cones(contact, options)
-    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k)
+    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k, 0)
     return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), cones
 
 
@@ -187,7 +156,8 @@ def _pack_builtin_contact(
         else (0.0, contact.corners)
     )
     points = np.array(points).reshape(-1, 3)
-    row = (joint, CONTACT_KINDS[type(contact)], 0, len(points), len(contact.row_names), contact.k)
+    kind, n_rows = CONTACT_KINDS[type(contact)], len(contact.row_names)
+    row = (joint, kind, 0, len(points), n_rows, contact.k, 0)
     return (
         row,
         np.concatenate([pose, contact.normal, [radius]])[None],

@@ -13,8 +13,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from floatbase.control.tick import problem_arrays as size
 from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
+from floatbase.control.tick.dynamics import (
+    DRIFT_FACTOR,
+    MASS,
+    N_TERMS,
+    Model,
+    bodies_size,
+    compute_dynamics,
+    take_bodies,
+)
 from floatbase.control.tick.elimination import (
     DEPENDENT_ROW,
     ZERO_ROW,
@@ -26,68 +36,65 @@ from floatbase.control.tick.elimination import (
 )
 from floatbase.control.tick.inequalities import Inequalities, affine_value, joint_bounds
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
-from floatbase.control.tick.kinematics import Bodies, ContactTable, contact_rows, forward_velocities
-from floatbase.control.tick.problem_arrays import (
-    HAS_JOINT_LIMITS,
-    HAS_OPTIONAL,
-    N_CONE_ROWS,
-    N_CONTACT_NUMBERS,
-    N_CONTACTS,
-    N_DRIVEN,
-    N_FORCES,
-    N_INEQUALITIES,
-    N_JOINTS,
-    N_MOTION_ROWS,
-    N_POINTS,
-    N_TARGETS,
-    N_TASKS,
-    N_USER_TASKS,
-    POINTS_ONLY,
+from floatbase.control.tick.kinematics import ContactTable, contact_rows
+from floatbase.control.tick.workspace import (
+    all_finite,
+    read_matrix,
+    read_vector,
+    take_matrix,
+    take_vector,
 )
-from floatbase.control.tick.workspace import all_finite, take_matrix, take_vector
 from floatbase.robots import UNIT_NORM_TOLERANCE
 
 INVALID, STOPPED = -1, -4
-N_STAGES = 4  # of a tick: contact rows, elimination, costs, optimum
+N_STAGES = 5  # of a tick: dynamics, contact rows, elimination, costs, optimum
 # m/s², N·m or N: a larger entry of the answer is nearly undetermined and has lost its digits
 MAX_ENTRY = 1e8
 
 
 @jit_inline
-def unpack(nv, sizes, int_tables, float_tables, inputs, least, largest, saturated):
-    """Return tree, links, contacts, tasks, limits and joint limits from their flat arrays.
+def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest, saturated):
+    """Return model, contacts, tasks, limits and joint limits from their flat arrays.
 
     `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: its entries
-    have names in `problem_arrays`. least, largest, saturated: memory for `Inequalities`.
-    int_tables, float_tables: integers and real numbers of all tables, one table after another, as
-    in a workspace. inputs: as for `tick`.
+    have names in `problem_arrays`. counters: two integers of memory. least, largest, saturated:
+    memory for `Inequalities`. int_tables, float_tables: integers and real numbers of all tables,
+    one table after another. inputs: as for `tick`.
     """
-    n, d, k = sizes[N_JOINTS], sizes[N_DRIVEN], sizes[N_FORCES]
-    n_contacts, n_points, n_rows = sizes[N_CONTACTS], sizes[N_POINTS], sizes[N_CONE_ROWS]
-    n_tasks, n_user_tasks = sizes[N_TASKS], sizes[N_USER_TASKS]
-    int_tables[0], float_tables[0] = 1, 1
-    tree, links = take_matrix(int_tables, n, 5), take_matrix(float_tables, n, 4)
-    contact_table = take_matrix(int_tables, n_contacts, 6)
-    frames = take_matrix(float_tables, n_contacts, 16)
-    points = take_matrix(float_tables, n_points, 3)
-    bounds = sizes[N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
+    n, d, k = sizes[size.N_JOINTS], sizes[size.N_DRIVEN], sizes[size.N_FORCES]
+    n_contacts, n_points = sizes[size.N_CONTACTS], sizes[size.N_POINTS]
+    n_rows, n_tasks = sizes[size.N_CONE_ROWS], sizes[size.N_TASKS]
+    n_user_tasks = sizes[size.N_USER_TASKS]
+    ints, floats = counters[:1], counters[1:]
+    ints[0], floats[0] = 0, 0
+    tree = read_matrix(int_tables, ints, n, 6)
+    contact_table = read_matrix(int_tables, ints, n_contacts, 7)
+    task_table = read_matrix(int_tables, ints, n_tasks, 3)
+    terms = read_vector(float_tables, floats, N_TERMS)
+    links = read_matrix(float_tables, floats, n, MASS + 1)
+    joints = read_matrix(float_tables, floats, n, 15)
+    model = Model(tree, joints, links, read_vector(float_tables, floats, nv), terms)
+    frames = read_matrix(float_tables, floats, n_contacts, 16)
+    points = read_matrix(float_tables, floats, n_points, 3)
+    bounds = sizes[size.N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
     user_start = bounds + 2 * n_points
-    points_only = sizes[POINTS_ONLY] == 1
+    points_only = sizes[size.POINTS_ONLY] == 1
     contacts = ContactTable(contact_table, frames, points, inputs, user_start, points_only)
-    task_table, gains = take_matrix(int_tables, n_tasks, 3), take_matrix(float_tables, n_tasks, 3)
-    user_tasks = user_start + sizes[N_CONTACT_NUMBERS]
+    gains = read_matrix(float_tables, floats, n_tasks, 3)
+    user_tasks = user_start + sizes[size.N_CONTACT_NUMBERS]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, n_user_tasks, nv, k, d)
-    task_frames = take_matrix(float_tables, n_tasks, 12)
+    task_frames = read_matrix(float_tables, floats, n_tasks, 12)
     tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, n_user_tasks, n_user_rows)
-    cones = take_matrix(float_tables, n_points * n_rows, 5)
-    torque_limits = take_vector(float_tables, d)
-    joint_limits, period_and_weight = take_matrix(float_tables, 6, d), take_vector(float_tables, 2)
+    cones = read_matrix(float_tables, floats, n_points * n_rows, 5)
+    torque_limits = read_vector(float_tables, floats, d)
+    joint_limits = read_matrix(float_tables, floats, 6, d)
+    period, joint_limit_weight = read_vector(float_tables, floats, 2)
     limits = Inequalities(
         cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities,
-        sizes[N_INEQUALITIES], sizes[HAS_OPTIONAL] == 1, sizes[HAS_JOINT_LIMITS] == 1, least,
-        largest, period_and_weight[1], saturated,
+        sizes[size.N_INEQUALITIES], sizes[size.HAS_CONES] == 1, sizes[size.HAS_OPTIONAL] == 1,
+        sizes[size.HAS_JOINT_LIMITS] == 1, least, largest, joint_limit_weight, saturated,
     )  # fmt: skip
-    return tree, links, contacts, tasks, limits, joint_limits, period_and_weight[0]
+    return model, contacts, tasks, limits, joint_limits, period
 
 
 def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
@@ -96,24 +103,25 @@ def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int
     sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
     """
     n_joints, n_tasks, m, d, k = (
-        int(sizes[entry]) for entry in (N_JOINTS, N_TASKS, N_MOTION_ROWS, N_DRIVEN, N_FORCES)
+        int(sizes[entry])
+        for entry in (size.N_JOINTS, size.N_TASKS, size.N_MOTION_ROWS, size.N_DRIVEN, size.N_FORCES)
     )
     base = 6
     nv = d + base
     n = nv + k  # and no more β than that
-    contact = 12 * n_joints + (k + m) * nv + m
+    contact = bodies_size(n_joints, nv) + (k + m) * nv + m
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
     cost = (3 * n_tasks + n_user_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
     search = (n + 1) ** 2 + 4 * n * n + 8 * n + k + 3 * d + nv
-    return 1 + contact + elimination + space + cost + search, 1 + (m + base) + 3 * n
+    return 1 + contact + elimination + space + cost + search, 3 + (m + base) + 3 * n
 
 
 @jit
 def inputs_valid(q, v, inputs, tree):
     """Return whether all numbers are finite, and quaternions and (cos, sin) in q have length 1.
 
-    tree: as in `Bodies`.
+    tree: as in `Model`.
     """
     if not (all_finite(q) and all_finite(v) and all_finite(inputs)):
         return False
@@ -149,8 +157,8 @@ def make_tick(digest):
     """Return the function `tick`, to be compiled; digest: of this folder."""
 
     def tick(
-        q, v, inputs, M, h, J, Ag, oMi, sizes, int_tables, float_tables, float_workspace,
-        int_workspace, result, stages,
+        q, v, inputs, sizes, int_tables, float_tables, float_workspace, int_workspace, result,
+        stages,
     ):  # fmt: skip
         """Compute torques, accelerations and forces of one state: eqs. (26), (27).
 
@@ -158,56 +166,61 @@ def make_tick(digest):
         (nv,), the state. inputs: what changes from tick to tick, as `user_terms.UserTerms` packs
         it: targets, minimum and maximum normal force of each point, then user-defined contacts,
         tasks and rows. sizes, int_tables, float_tables: as for `unpack`; few arrays, since each one
-        costs time. M, h, J, Ag, oMi: the views of `problem_arrays.Dynamics` for q and v.
-        float_workspace, int_workspace: workspaces of `workspace_sizes` numbers. result: receives
-        q̈, τ, λ, then the multipliers and the numbers of the active rows, (nv + k,) each, then
+        costs time. float_workspace, int_workspace: workspaces of `workspace_sizes` numbers, the
+        only memory besides `result` that is written to. result: receives q̈, τ, λ, then the
+        multipliers and the numbers of the active rows, (nv + k,) each, then
         `Inequalities.saturated`. stages: how many of N_STAGES to run, for benchmarks.
         """
         _ = digest  # makes it part of numba's cache key
-        nv, m, d, k = v.size, sizes[N_MOTION_ROWS], sizes[N_DRIVEN], sizes[N_FORCES]
+        nv, m = v.size, sizes[size.N_MOTION_ROWS]
+        d, k = sizes[size.N_DRIVEN], sizes[size.N_FORCES]
         base, n = nv - d, nv + k
+        passive = base if sizes[size.UNDERACTUATED] == 1 else 0  # rows of (7) without a motor
         float_workspace[0], int_workspace[0] = 1, 1
         least, largest = take_vector(float_workspace, d), take_vector(float_workspace, d)
-        tree, links, contacts, tasks, limits, joint_limits, period = unpack(
-            nv, sizes, int_tables, float_tables, inputs, least, largest, result[3 * n + d :]
-        )
-        if not inputs_valid(q, v, inputs, tree):
+        model, contacts, tasks, limits, joint_limits, period = unpack(
+            nv, sizes, int_tables, float_tables, inputs, take_vector(int_workspace, 2), least,
+            largest, result[3 * n + d :],
+        )  # fmt: skip
+        if not inputs_valid(q, v, inputs, model.tree):
             return INVALID
-        velocity = take_matrix(float_workspace, tree.shape[0], 6)
-        drift = take_matrix(float_workspace, tree.shape[0], 6)
-        bodies = Bodies(tree, links, oMi, J, Ag, velocity, drift)
-        forward_velocities(bodies, v)
+        bodies = take_bodies(model, v, float_workspace)
+        compute_dynamics(model, bodies, q)
+        if stages == 1:
+            return STOPPED
+        M, h = bodies.M, bodies.h
         J_points, b = take_matrix(float_workspace, k, nv), take_vector(float_workspace, m)
         A = J_points if contacts.points_only else take_matrix(float_workspace, m, nv)
         contact_rows(bodies, contacts, A, b, J_points)
-        if stages == 1:
+        for i in range(m):
+            b[i] *= model.terms[DRIFT_FACTOR]
+        if stages == 2:
             return STOPPED
-        M_rows = M.T  # symmetric, and Pinocchio stores it by columns
-        B = take_matrix(float_workspace, m + base, n + 1)
-        pivots = take_vector(int_workspace, m + base)
+        B = take_matrix(float_workspace, m + passive, n + 1)
+        pivots = take_vector(int_workspace, m + passive)
         motion_pivot, smallest_pivot = eliminate(
-            A, b, M_rows, h, J_points, base, float_workspace, B, pivots
+            A, b, M, h, J_points, passive, float_workspace, B, pivots
         )
         if motion_pivot <= DEPENDENT_ROW:
             rows, rhs = take_matrix(float_workspace, m, nv), take_vector(float_workspace, m)
             m = independent_rows(A, b, v, rows, rhs)
             if m < 0:
                 return INACCURATE
-            B, pivots = B[: m + base], pivots[: m + base]
+            B, pivots = B[: m + passive], pivots[: m + passive]
             _, smallest_pivot = eliminate(
-                rows[:m], rhs[:m], M_rows, h, J_points, base, float_workspace, B, pivots
+                rows[:m], rhs[:m], M, h, J_points, passive, float_workspace, B, pivots
             )
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE
-        nb = n - m - base
+        nb = n - m - passive
         space = Parametrisation(
             take_matrix(float_workspace, n, nb + 1),
             take_vector(int_workspace, n),
             take_matrix(float_workspace, d, nb + 1),
         )
         parametrise(B, pivots, m, take_vector(int_workspace, nb), space.V, space.beta_index)
-        torques(space.V, space.beta_index, M_rows, h, J_points, base, space.T)
-        if stages == 2:
+        torques(space.V, space.beta_index, M, h, J_points, base, space.T)
+        if stages == 3:
             return STOPPED
         R = take_matrix(
             float_workspace, 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3, nb + 1
@@ -218,10 +231,10 @@ def make_tick(digest):
         )
         if used < 0:
             return INVALID
-        if stages == 3:
+        if stages == 4:
             return STOPPED
         if limits.has_joint_limits:
-            joint_bounds(q, v, tree, joint_limits, period, least, largest)
+            joint_bounds(q, v, model.tree, joint_limits, period, least, largest)
         beta, active = take_vector(float_workspace, nb), take_vector(int_workspace, nb)
         mu = result[n + d : n + d + nb]
         n_active = dual_search(
@@ -234,4 +247,4 @@ def make_tick(digest):
     return tick
 
 
-tick = jit_cached(make_tick)
+tick = jit_cached(make_tick, nogil=True)  # other threads can run Python meanwhile

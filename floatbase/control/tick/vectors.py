@@ -15,6 +15,12 @@ def row_part(array, i, first):
 
 
 @jit
+def write_row(array, i, first, a):
+    """Write a into row i of an array (n, m), from column `first` on."""
+    array[i, first], array[i, first + 1], array[i, first + 2] = a
+
+
+@jit
 def column_part(array, first, c):
     """Return three numbers of column c of an array (n, m), from row `first` on."""
     return array[first, c], array[first + 1, c], array[first + 2, c]
@@ -54,6 +60,13 @@ def cross(a, b):
 def rotate(R, a):
     """Return R a."""
     return plus(plus(times(a[0], R[0]), times(a[1], R[1])), times(a[2], R[2]))
+
+
+@jit
+def transpose(R):
+    """Return the rows of R as columns."""
+    x, y, z = R
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
 
 @jit

@@ -30,6 +30,23 @@ def take_matrix(workspace, rows, columns):
     return take_vector(workspace, rows * columns).reshape(rows, columns)
 
 
+@jit_inline
+def read_vector(table, counter, n):
+    """Return the next n numbers of a table; counter: (1,), how many were read before.
+
+    Unlike a workspace, a table is only read, so that several threads may share it.
+    """
+    first = counter[0]
+    counter[0] = first + n
+    return table[first : counter[0]]
+
+
+@jit_inline
+def read_matrix(table, counter, rows, columns):
+    """Return the next numbers of a table as an array (rows, columns)."""
+    return read_vector(table, counter, rows * columns).reshape(rows, columns)
+
+
 @jit
 def clear(array):
     """Set all entries of a C-contiguous array to zero."""

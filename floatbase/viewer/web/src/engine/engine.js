@@ -1,7 +1,7 @@
 // A robot with its controller in MuJoCo: one control step per millisecond. Deterministic: the same
 // settings and pushes give the same run. It needs neither a page nor a clock.
 
-import {createDynamics} from "./dynamics.js";
+import {readState} from "./dynamics.js";
 import {contactForces, makeModel} from "./model.js";
 import {checkPush, checkSettings, defaults} from "./settings.js";
 import {NO_ANSWER, createTick, setParameter} from "./tick.js";
@@ -22,7 +22,7 @@ export function createEngine(mj, module, robot) {
   const {d, nv, points, bodies} = robot, base = bodies[1];
   const tick = createTick(module, robot), {views} = tick;
   const buffer = new mj.DoubleBuffer(6);
-  const updateDynamics = createDynamics(mj, assumed.model, assumed.data, robot, views);
+  const readAssumed = () => readState(mj, assumed.model, assumed.data, robot, views);
   let settings = defaults(robot), pushes = [], outcome = "", active = 0, steps = 0, offAt = -1;
   let target = [0, 0, 0], shift = [0, 0, 0]; // m, of the centre of mass from its place at rest
   let stance = {lifted: null, since: 0, lower: 0}; // the foot that is in the air
@@ -39,6 +39,8 @@ export function createEngine(mj, module, robot) {
     setParameter(views.floats, parameters.mu, settings.mu);
     setParameter(views.floats, parameters.torque, settings.torque);
     views.floats[parameters.baseMass] = assumed.baseMass + settings.payload;
+    views.floats[parameters.gravity] = settings.hasGravity ? -settings.gravity : 0;
+    views.floats[parameters.velocityForces] = Number(settings.hasCoriolis);
     if (walk === null) placeTargets();
   }
   function placeTargets() {
@@ -49,8 +51,8 @@ export function createEngine(mj, module, robot) {
     }
   }
   function apply() {
-    const {gravity, payload, actualPayload, hasGravity, actualHasGravity} = settings;
-    assumed.change({payload, gravity: hasGravity ? gravity : 0});
+    const {gravity, payload, actualPayload, actualHasGravity} = settings;
+    assumed.change({payload, gravity});
     actual.change({payload: actualPayload, gravity: actualHasGravity ? gravity : 0});
     actual.setMissing(settings.missing);
     if (settings.actualHasCoriolis) actual.data.qfrc_applied.fill(0);
@@ -143,12 +145,11 @@ export function createEngine(mj, module, robot) {
     gait = gait === null ? settings.gait : null;
   }
   function moveWalk(time) {
-    const {subtree_com: coms} = assumed.data, {com, comVelocity, Ag, v} = views;
-    const mass = assumed.model.body_subtreemass[base];
-    for (let r = 0; r < 3; r++) {
-      com[r] = coms[3 * base + r];
-      comVelocity[r] = v.reduce((sum, x, i) => sum + Ag[6 * i + r] * x, 0) / mass;
-    }
+    mj.mj_comVel(assumed.model, assumed.data);
+    mj.mj_subtreeVel(assumed.model, assumed.data);
+    const {subtree_com: coms, subtree_linvel: velocities} = assumed.data;
+    views.com.set(coms.subarray(3 * base, 3 * base + 3));
+    views.comVelocity.set(velocities.subarray(3 * base, 3 * base + 3));
     if (walk.update(time, measure)) select();
     walk.write(time);
   }
@@ -159,7 +160,7 @@ export function createEngine(mj, module, robot) {
     if (walk === null && (moveFeet() | moveTargets())) placeTargets();
     assumed.data.qpos.set(qpos);
     assumed.data.qvel.set(qvel);
-    updateDynamics(settings.hasCoriolis);
+    readAssumed();
     if (walk !== null) moveWalk(time);
     active = tick.run();
     if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
@@ -203,7 +204,7 @@ export function createEngine(mj, module, robot) {
   reset();
   return {
     tick,
-    updateDynamics,
+    readAssumed,
     actual,
     assumed,
     reset,

@@ -1,16 +1,15 @@
 // The compiled control step: the WebAssembly module that `make live` builds from
 // floatbase/control/tick. All tasks, constraints and the solver are in the module.
 
-// names and numbers of dimensions of the arguments of `tick` in floatbase/control/tick/tick.py
+// names of the arguments of `tick` in floatbase/control/tick/tick.py
 const ARGUMENTS = [
-  ["q", 1], ["v", 1], ["inputs", 1], ["M", 2], ["h", 1], ["J", 2], ["Ag", 2], ["oMi", 2],
-  ["sizes", 1], ["ints", 1], ["floats", 1], ["floatWork", 1], ["intWork", 1], ["result", 1],
+  "q", "v", "inputs", "sizes", "ints", "floats", "floatWork", "intWork", "result",
 ];
 // those of `write_targets` in floatbase/behaviours/walk/compiled_targets.py, after the time
 const TARGET_ARGUMENTS = ["com", "comVelocity", "body", "pieces", "swings", "inputs"];
 const MOST_PIECES = 16, MOST_SWINGS = 4; // of a plan
 const INTEGERS = new Set(["sizes", "ints", "intWork"]);
-const N_STAGES = 4n;
+const N_STAGES = 5n;
 const ITEM = 8; // bytes of a number
 const PAGE = 65536; // bytes of a page of memory
 export const NO_ANSWER = {invalid: -1, inaccurate: -2, infeasible: -3};
@@ -37,16 +36,16 @@ function imports(module, memory) {
 
 // The control step of a robot. module: the compiled WebAssembly module. robot: its data, see
 // floatbase/live/robots.py. `views` are its inputs and outputs, to be filled and
-// read in place; matrices are stored as in Pinocchio.
+// read in place.
 export function createTick(module, robot) {
   let memory = null;
   const {exports} = new WebAssembly.Instance(module, imports(module, () => memory));
   memory = exports.memory;
   const problems = Object.values(robot.problems);
   const most = (get) => Math.max(...problems.map(get));
-  const {nq, nv, bodies, walking} = robot, n = bodies.length, layout = walking?.layout;
+  const {nq, nv, walking} = robot, layout = walking?.layout;
   const lengths = {
-    q: nq, v: nv, M: nv * nv, h: nv, J: 6 * nv, Ag: 6 * nv, oMi: 12 * n,
+    q: nq, v: nv,
     inputs: most((one) => one.inputs.length), sizes: most((one) => one.sizes.length),
     ints: most((one) => one.ints.length), floats: most((one) => one.floats.length),
     floatWork: most((one) => one.workspace[0]), intWork: most((one) => one.workspace[1]),
@@ -72,19 +71,14 @@ export function createTick(module, robot) {
   }));
   const status = new BigInt64Array(memory.buffer, returned, 1);
   const stack = exports.__stack_pointer.value;
-  const columns = {M: [nv, nv], J: [6, nv], Ag: [6, nv]}; // stored column by column
   let args = [], problem = null;
 
   // numba's form of an array: owner, parent, items, bytes of an item, address, shape, strides
   function array(name, shape) {
-    const strides = name in columns ? [ITEM, ITEM * shape[0]]
-      : shape.length === 2 ? [ITEM * shape[1], ITEM] : [ITEM];
+    const strides = shape.length === 2 ? [ITEM * shape[1], ITEM] : [ITEM];
     const count = shape.reduce((a, b) => a * b, 1);
     return [0, 0, BigInt(count), BigInt(ITEM), begins[name], ...shape.map(BigInt),
       ...strides.map(BigInt)];
-  }
-  function asArgument([name, dimensions]) {
-    return array(name, columns[name] ?? (dimensions === 2 ? [n, 12] : [sizeOf(name)]));
   }
   function sizeOf(name) {
     if (name === "floatWork") return problem.workspace[0];
@@ -115,7 +109,8 @@ export function createTick(module, robot) {
       views.ints.set(problem.ints.map(BigInt));
       views.floats.set(problem.floats);
       views.inputs.set(problem.inputs);
-      args = [returned, exception, ...ARGUMENTS.flatMap(asArgument), N_STAGES];
+      args = [returned, exception, ...ARGUMENTS.flatMap((name) => array(name, [sizeOf(name)])),
+        N_STAGES];
     },
     // Compute the command for the present contents of `views`. Returns the number of active
     // constraints, or one of NO_ANSWER.
