@@ -11,6 +11,7 @@ from typing import TypeAlias, cast
 
 import numpy as np
 
+from floatbase._blas import one_blas_thread
 from floatbase._validation import (
     Array,
     Value,
@@ -143,7 +144,9 @@ class Problem(Value):
         -------
         QP
             The QP in x = (q̈, τ, λ). With priority levels it is the QP of the last level, with the
-            optima of the other levels as equality constraints.
+            optima of the other levels as equality constraints. Soft inequalities, such as joint
+            limits by default, have a finite entry in its `penalties`. To solve it with another
+            solver, pass `qp.with_slacks()` to that solver.
 
         Raises
         ------
@@ -170,6 +173,7 @@ class Problem(Value):
             )
         return modified
 
+    @one_blas_thread()
     def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
         """Solve the QPs of all priority levels at a state and a time.
 
@@ -266,7 +270,8 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     Returns
     -------
     QP
-        The QP in x = (q̈, τ, λ).
+        The QP in x = (q̈, τ, λ). Soft inequalities have a finite entry in its `penalties`. To solve
+        it with another solver, pass `qp.with_slacks()` to that solver.
 
     Raises
     ------

@@ -178,7 +178,7 @@ class QP(Value):
         return found
 
     def with_slacks(self) -> QP:
-        """Return the equivalent problem with hard inequalities only.
+        """Return the equivalent problem with hard inequalities only, for any QP solver.
 
         Returns
         -------
