@@ -16,7 +16,7 @@ from floatbase._validation import Array, as_positive, short_repr
 from floatbase.errors import InputError
 from floatbase.robots._checks import clamp_to_limits, has_floating_base, joint_limits
 from floatbase.robots._shapes import link_shapes, placed_points
-from floatbase.robots.inertia import origin_attributes
+from floatbase.robots.inertia import origin_attributes, shifted
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
@@ -95,7 +95,7 @@ def with_foot_links(
         if not model.existFrame(foot.frame, pin.BODY):
             continue
         name, link = f"{foot.frame} foot", model.getFrameId(foot.frame, pin.BODY)
-        offset, frame = pin.SE3(np.eye(3), np.array(foot.centre)), model.frames[link]
+        offset, frame = shifted(foot.centre), model.frames[link]
         model.addFrame(pin.Frame(name, frame.parentJoint, link, frame.placement * offset, pin.BODY))
         ElementTree.SubElement(root, "link", name=name)
         joint = ElementTree.SubElement(root, "joint", name=f"{name} weld", type="fixed")

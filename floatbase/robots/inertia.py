@@ -69,6 +69,11 @@ def text_of(numbers: npt.ArrayLike) -> str:
     return " ".join(map(repr, np.ravel(numbers).astype(float).tolist()))
 
 
+def shifted(translation: npt.ArrayLike) -> pin.SE3:
+    """Return the placement that only shifts."""
+    return pin.SE3(np.eye(3), np.array(translation))
+
+
 def origin_attributes(place: pin.SE3) -> dict[str, str]:
     """Return the attributes of an <origin>."""
     rpy = pin.rpy.matrixToRpy(place.rotation)

@@ -309,7 +309,8 @@ def load_mjcf(
         Name of the robot. By default the file name without its extension.
     floating : bool, optional
         Whether the base can move freely; by default, whether it has a free joint in the file. With
-        True, a free joint replaces the joints between the base and the world.
+        True, a free joint replaces the joints between the base and the world. With False, the base
+        is welded to the world where it is initially.
     feet : sequence of str or Foot, optional
         Bodies, sites, geoms or `Foot` values that can touch the ground; by default as in
         `load_urdf`.

@@ -20,8 +20,8 @@ import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.errors import InputError, unknown_name
-from floatbase.robots._checks import clamp_to_limits
-from floatbase.robots.inertia import origin_attributes, text_of
+from floatbase.robots._checks import clamp_to_limits, has_floating_base
+from floatbase.robots.inertia import origin_attributes, shifted, text_of
 from floatbase.robots.urdf import parse_urdf, read_text
 
 _Joint, _Geom = mujoco.mjtJoint, mujoco.mjtGeom
@@ -50,12 +50,13 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
     """
     folder, text = file.resolve().parent, read_text(file)
     try:
-        tag = ElementTree.fromstring(text).tag
+        tag = (root := ElementTree.fromstring(text)).tag
         if tag != "mujoco":
             advice = " Load it with fb.load_urdf." if tag == "robot" else ""
             raise ValueError(f"its outermost element is <{tag}>, but it must be <mujoco>.{advice}")
+        folders = [folder, *((folder / m.get("file", "")).parent for m in root.iter("model"))]
         spec = mujoco.MjSpec.from_file(str(file))
-        missing = _drop_what_is_missing(spec, folder)
+        missing = _drop_what_is_missing(spec, folders)
         # welded bodies are links, and visual geoms are drawn
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         compiled = spec.compile()
@@ -64,36 +65,43 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{file} cannot be read as an MJCF: {error}") from None
     writer = _Writer(name, compiled, spec, folder, bool(floating))
-    urdf, qpos = writer.urdf(), writer.configuration(keyframe)
+    urdf, qpos = writer.urdf(floating is False), writer.configuration(keyframe)
     model = parse_urdf(name, urdf, bool(writer.root) if floating is None else floating)
     q, armature = pin.neutral(model), np.zeros(model.nv)
-    if writer.root in writer.free and floating is not False:
+    if has_floating_base(model):
         start = compiled.jnt_qposadr[compiled.body_jntadr[writer.root]]
-        q[:7] = qpos[start : start + 7][[0, 1, 2, 4, 5, 6, 3]]
+        place = np.append(compiled.body_pos[writer.root], compiled.body_quat[writer.root])
+        place = qpos[start : start + 7] if writer.root in writer.free else place
+        q[:7] = place[[0, 1, 2, 4, 5, 6, 3]]
     for i in writer.joints:
         joint = model.joints[model.getJointId(writer.label("joint", i))]
         x = qpos[compiled.jnt_qposadr[i]]
         q[joint.idx_q :][: joint.nq] = x if joint.nq == 1 else (np.cos(x), np.sin(x))
-        armature[joint.idx_v] = writer.rotor_inertia(i)
+        armature[joint.idx_v] = writer.with_motors(i, "armature")
     model.armature = armature
     posture = clamp_to_limits(model, pin.normalize(model, q))
     return Mjcf(urdf, model, posture, compiled.nkey > 0, writer.differences(missing))
 
 
-def _drop_what_is_missing(spec: mujoco.MjSpec, folder: Path) -> list[str]:
+def _drop_what_is_missing(spec: mujoco.MjSpec, folders: list[Path]) -> list[str]:
     """Remove the geoms whose mesh file is missing, and return the names of these meshes.
 
-    Parts that a robot does not need, such as textures and terrain, are removed as well. So are
-    contacts with geoms that only the scene around the robot has.
+    The others get the paths of their files, beside the MJCF or one attached to it. Parts that a
+    robot does not need, such as textures and terrain, are removed as well. So are contacts with
+    geoms that only the scene around the robot has.
     """
     for texture in spec.textures:
         texture.file, texture.cubefiles = "", [""] * len(texture.cubefiles)
         texture.builtin, texture.width, texture.height = mujoco.mjtBuiltin.mjBUILTIN_FLAT, 1, 1
-    missing = {
-        mesh.name or Path(mesh.file).stem: mesh
-        for mesh in spec.meshes
-        if mesh.file and not _mesh_path(spec, mesh, folder).is_file()
-    }
+    missing = dict[str, mujoco.MjsMesh]()
+    for mesh in filter(lambda mesh: mesh.file, spec.meshes):
+        file = Path(mesh.file).name if spec.strippath else mesh.file
+        paths = [folder / (mesh.compiler.meshdir or "") / file for folder in folders]
+        found = [str(path) for path in paths if path.is_file()]
+        mesh.file = (found or [mesh.file])[0]
+        if not found:
+            missing[mesh.name or Path(mesh.file).stem] = mesh
+    spec.strippath = False  # paths are complete now
     for geom in list(spec.geoms):
         body = geom.parent
         has_mass = not body.explicitinertial and geom.mass != 0.0 and geom.density != 0.0
@@ -109,12 +117,6 @@ def _drop_what_is_missing(spec: mujoco.MjSpec, folder: Path) -> list[str]:
     for part in (*missing.values(), *spec.hfields, *spec.skins, *spec.sensors, *pairs):
         spec.delete(part)
     return list(missing)
-
-
-def _mesh_path(spec: mujoco.MjSpec, mesh: mujoco.MjsMesh, folder: Path) -> Path:
-    """Return the path of a mesh's file."""
-    file = Path(mesh.file).name if spec.strippath else mesh.file
-    return folder / (mesh.compiler.meshdir or "") / file
 
 
 class _Writer:
@@ -176,17 +178,24 @@ class _Writer:
 
     def label(self, kind: str, number: int) -> str:
         """Return the name of a body, joint, geom, …, or one made from its number."""
-        return getattr(self._model, kind)(number).name or f"{kind}_{number}"
+        new, kind_id = f"{kind}_{number}", getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        while mujoco.mj_name2id(self._model, kind_id, new) >= 0:  # it is the name of another one
+            new += "_"
+        return getattr(self._model, kind)(number).name or new
 
     def _labels(self, kind: str, numbers: npt.ArrayLike) -> list[str]:
         """Return the names of several bodies, joints, …."""
         return [self.label(kind, number) for number in np.array(numbers, dtype=int).tolist()]
 
-    def urdf(self) -> str:
-        """Write the URDF."""
-        model = self._model
+    def urdf(self, is_bolted: bool) -> str:
+        """Write the URDF, with a base that could float welded to the world if `is_bolted`."""
+        model, root = self._model, self.root
         for body in self._bodies:
             self._add_body(body)
+        if root and is_bolted:
+            self._links["world"] = ""
+            place = _placement(model.body_pos[root], model.body_quat[root])
+            self._add_joint("world weld", "fixed", "world", self.label("body", root), place)
         for geom in range(model.ngeom):
             if model.geom_bodyid[geom] in self._bodies:
                 self._add_geom(geom)
@@ -206,7 +215,7 @@ class _Writer:
         pairs = [(i, j) for i in range(3) for j in range(i, 3)]
         entries = " ".join(f"i{'xyz'[i]}{'xyz'[j]}='{text_of(tensor[i, j])}'" for i, j in pairs)
         self._links[name] = (
-            f"<inertial>{_origin(_offset(model.body_ipos[body]))}"
+            f"<inertial>{_origin(shifted(model.body_ipos[body]))}"
             f"<mass value='{text_of(model.body_mass[body])}'/><inertia {entries}/></inertial>"
         )
         if body == self.root:
@@ -219,8 +228,8 @@ class _Writer:
             is_body = joint == joints[-1] and not anchor.any()
             child = name if is_body else f"{self.label('joint', joint)} link"
             self._links.setdefault(child, "")
-            self._add_moving_joint(joint, parent, child, place * _offset(anchor))
-            parent, place = child, _offset(-anchor)
+            self._add_moving_joint(joint, parent, child, place * shifted(anchor))
+            parent, place = child, shifted(-anchor)
         if parent != name:
             self._add_joint(f"{name} weld", "fixed", parent, name, place)
 
@@ -246,14 +255,14 @@ class _Writer:
         # MuJoCo measures motion from the reference
         back = -model.qpos0[model.jnt_qposadr[joint]] * model.jnt_axis[joint]
         is_hinge = kind == _Joint.mjJNT_HINGE
-        place = place * (pin.SE3(pin.exp3(back), np.zeros(3)) if is_hinge else _offset(back))
+        place = place * (pin.SE3(pin.exp3(back), np.zeros(3)) if is_hinge else shifted(back))
         lower, upper = model.jnt_range[joint] if limited else np.zeros(2)
         dof = model.jnt_dofadr[joint]
         effort = text_of(self._largest_torque(joint))
         rest = (
             f"<axis xyz='{text_of(model.jnt_axis[joint])}'/><limit lower='{text_of(lower)}' "
             f"upper='{text_of(upper)}' effort='{effort}' velocity='0'/>"
-            f"<dynamics damping='{text_of(model.dof_damping[dof])}' "
+            f"<dynamics damping='{text_of(self.with_motors(joint, 'damping'))}' "
             f"friction='{text_of(model.dof_frictionloss[dof])}'/>{self._mimic(joint)}"
         )
         kind_name = "continuous" if is_hinge and not limited else _JOINT_TYPES[kind]
@@ -295,7 +304,7 @@ class _Writer:
         place = _placement(model.geom_pos[geom], model.geom_quat[geom])
         ball = f"<sphere radius='{text_of(size[0])}'/>"
         cylinder = f"<cylinder radius='{text_of(size[0])}' length='{text_of(2.0 * size[1])}'/>"
-        ends = [(ball, _offset([0.0, 0.0, z])) for z in (-size[1], size[1])]
+        ends = [(ball, shifted([0.0, 0.0, z])) for z in (-size[1], size[1])]
         round_shapes = {
             _Geom.mjGEOM_SPHERE: [(ball, middle)],
             _Geom.mjGEOM_CYLINDER: [(cylinder, middle)],
@@ -306,7 +315,7 @@ class _Writer:
         if kind == _Geom.mjGEOM_MESH:
             mesh = model.geom_dataid[geom]
             asset = self._spec.meshes[mesh]
-            path = _mesh_path(self._spec, asset, self._folder)
+            path = Path(asset.file)
             is_moved = asset.refpos.any() or asset.refquat[0] != 1.0
             if asset.file and path.suffix.lower() in _MESH_FILES and not is_moved:
                 location = Path(os.path.relpath(path, self._folder)).as_posix()
@@ -319,7 +328,7 @@ class _Writer:
             return [], place  # planes are no part of a robot
         # the box itself, or that around an ellipsoid or another mesh
         box = model.geom_aabb[geom]
-        return [(f"<box size='{text_of(2.0 * box[3:])}'/>", _offset(box[:3]))], place
+        return [(f"<box size='{text_of(2.0 * box[3:])}'/>", shifted(box[:3]))], place
 
     def configuration(self, keyframe: str | None) -> Array:
         """Return MuJoCo's qpos in a keyframe; by default in the first one, or else initially."""
@@ -345,11 +354,11 @@ class _Writer:
         gear: Array = self._model.actuator_gear[self._model.actuator_outadr[motors], 0]
         return gear
 
-    def rotor_inertia(self, joint: int) -> float:
-        """Return the rotor inertia that a joint feels [kg m² or kg]."""
-        model, motors = self._model, self._motors(joint)
-        inertia = model.dof_armature[model.jnt_dofadr[joint]]
-        return float(inertia + self._gear(motors) ** 2 @ model.actuator_armature[motors])
+    def with_motors(self, joint: int, quantity: str) -> float:
+        """Return the armature [kg m² or kg] or the damping of a joint, with that of its motors."""
+        motors, of_joint = self._motors(joint), getattr(self._model, f"dof_{quantity}")
+        of_motors = self._gear(motors) ** 2 @ getattr(self._model, f"actuator_{quantity}")[motors]
+        return float(of_joint[self._model.jnt_dofadr[joint]] + of_motors)
 
     def _largest_torque(self, joint: int) -> float:
         """Return the torque or force that all actuators of a joint can apply; 0 if unlimited."""
@@ -365,6 +374,7 @@ class _Writer:
         is_torque_motor = (
             model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
             and model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_NONE
+            and model.actuator_dyntype[motor] != mujoco.mjtDyn.mjDYN_INTEGRATOR
         )
         if is_torque_motor and model.actuator_ctrllimited[control]:
             force = _magnitude(model.actuator_gainprm[motor, 0] * model.actuator_ctrlrange[control])
@@ -382,6 +392,11 @@ class _Writer:
         surroundings = f"gravity {text_of(gravity)}, density {option.density:g}"
         roots = np.unique(model.body_rootid[model.jnt_bodyid]).tolist()
         others = [root for root in roots if not self._is_of_robot(root)]
+        nonlinear = [model.jnt_stiffnesspoly, model.dof_dampingpoly[model.jnt_dofadr]]
+        coefficients = np.column_stack([model.jnt_stiffness, *nonlinear])[joints]
+        springs = joints[np.flatnonzero(coefficients.any(axis=1))]
+        base = [model.body_jntadr[self.root]] if self.root in self.free else []
+        heavy = [joint for joint in base if model.dof_armature[model.jnt_dofadr[joint]]]
         constraints = list(self._couplings.values())
         coupled = {*self._couplings, *model.eq_obj2id[constraints].tolist()}  # they are locked
         driven = [i for i in self.joints if i not in coupled and model.nactuator]
@@ -393,15 +408,8 @@ class _Writer:
             ),
             "without tendons": self._labels("tendon", range(model.ntendon)),
             "without other moving bodies": self._labels("body", others),
-            "without springs": self._labels("joint", joints[model.jnt_stiffness[joints] != 0.0]),
-            "without the armature of free joints": self._labels(
-                "joint",
-                [
-                    model.body_jntadr[root]
-                    for root in self.free
-                    if self._is_of_robot(root) and model.dof_armature[model.body_dofadr[root]]
-                ],
-            ),
+            "without springs or nonlinear damping": self._labels("joint", springs),
+            "without the armature of free joints": self._labels("joint", heavy),
             "without gravity compensation": self._labels(
                 "body", bodies[model.body_gravcomp[bodies] != 0]
             ),
@@ -419,11 +427,6 @@ def _magnitude(limits: Array) -> float:
     """Return the largest magnitude that both directions of a range allow."""
     smallest, largest = sorted(map(float, np.abs(limits)))
     return smallest if min(limits) < 0.0 < max(limits) else largest
-
-
-def _offset(translation: npt.ArrayLike) -> pin.SE3:
-    """Return the placement that only shifts."""
-    return pin.SE3(np.eye(3), np.array(translation))
 
 
 def _placement(position: npt.ArrayLike, wxyz: npt.ArrayLike) -> pin.SE3:

@@ -95,8 +95,8 @@ def missing_meshes_message(robot: Robot) -> str:
 
 def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
     """Return a warning if a robot touches the ground at one or two points not given as `Foot`."""
-    is_stable = any(foot.is_flat or foot in given_feet for foot in robot.feet)
-    if is_stable or not 1 <= len(robot.feet) <= 2:
+    is_chosen = any(isinstance(foot, Foot) for foot in given_feet)
+    if is_chosen or any(foot.is_flat for foot in robot.feet) or not 1 <= len(robot.feet) <= 2:
         return ""
     names = [foot.frame for foot in robot.feet]
     advice = (

@@ -163,6 +163,9 @@ def test_a_biped_on_points_is_reported():
         fb.load_urdf(biped(BALLS), feet=["L_foot", "R_foot"], foot_radius=0.02)
     with warns(RobotWarning, "L_foot", "R_foot"):  # a box without a size marks a place
         fb.load_urdf(biped('<collision><geometry><box size="0 0 0"/></geometry></collision>'))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RobotWarning)  # the user's own points are no mistake
+        fb.load_urdf(biped(BALLS), feet=[Foot(f"{s}_foot", 0.02, [0.1, 0, -0.2]) for s in "LR"])
 
 
 @pytest.mark.parametrize("kind", ["continuous", "revolute"])  # here revolute joints have no limits

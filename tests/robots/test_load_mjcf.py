@@ -112,6 +112,18 @@ def test_limits_and_rotor_inertias_are_those_of_the_file(quadruped):
     assert set(quadruped(torque_limits=5.0).torque_limits) == {5.0}
 
 
+def test_motors_add_damping_to_their_joints_and_integrators_have_other_limits(load):
+    robot = load(
+        pendulum(
+            '<joint name="swing" damping="0.5"/>',
+            """<actuator><motor joint="swing" gear="3" damping="0.1" ctrlrange="-1 1"/>
+            <general joint="swing" dyntype="integrator" ctrlrange="-1 1"/></actuator>""",
+        )
+    )
+    assert robot.model.damping == pytest.approx([0.5 + 3**2 * 0.1])
+    assert robot.torque_limits == [np.inf]  # the control of an integrator is the rate of its force
+
+
 def test_keyframes_are_postures(quadruped):
     for robot, knee in ((quadruped(), -1.5), (quadruped(posture="low"), -2.2)):
         q = robot.model.idx_qs[robot.model.getJointId("RR_knee")]
@@ -176,6 +188,44 @@ def test_shapes_of_the_file_are_drawn_and_can_lie_on_the_ground(tmp_path):
         assert fb.load_mjcf(path).mass > 0.0
 
 
+def test_meshes_of_an_attached_file_are_beside_that_file(tmp_path):
+    (tmp_path / "arm").mkdir()
+    corners = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\n"
+    (tmp_path / "arm" / "wedge.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    joint = '<joint name="swing"/><geom type="mesh" mesh="wedge"/>'
+    part = f'<mujoco><asset><mesh file="wedge.obj"/></asset>{pendulum(joint)[8:]}'
+    (tmp_path / "arm" / "arm.xml").write_text(part)
+    (tmp_path / "robot.xml").write_text("""
+      <mujoco><asset><model name="arm" file="arm/arm.xml"/></asset><worldbody>
+      <body name="trunk"><freejoint/><geom size="0.2"/>
+      <frame euler="30 0 0"><attach model="arm" body="link" prefix="left_"/></frame>
+      </body></worldbody></mujoco>""")
+    robot = fb.load_mjcf(tmp_path / "robot.xml")
+    judge = judges.Mujoco(robot, mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml")))
+    state = robot.random_state(1)
+    assert judges.relative(state.M, judge.move_to(state).M) < 1e-12
+    assert np.ptp(robot_meshes(robot)[-1].vertices, axis=0).max() > 2.5
+
+
+def test_parts_without_a_name_get_one_that_no_other_part_has(load):
+    """MuJoCo's first body has the number 1, and its first joint the number 0."""
+    mjcf = """<mujoco><worldbody><body><joint/><geom size="0.1"/><body name="body_1" pos="1 0 0">
+      <joint name="joint_0"/><geom size="0.1"/></body></body></worldbody></mujoco>"""
+    robot = load(mjcf)
+    assert robot.joint_names[1] == "joint_0" and len(set(robot.joint_names)) == 2
+    assert robot.standing().point("body_1").tolist() == [1.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("joint", "floating"), [("<freejoint/>", False), ("", True)])
+def test_a_base_that_is_set_free_or_welded_keeps_its_place(load, joint, floating):
+    mjcf = f"""<mujoco><worldbody><body name="trunk" pos="0 0 2" euler="90 0 0">{joint}
+      <geom size="0.1"/><body name="link" pos="0 1 0"><joint/><geom size="0.1"/></body>
+      </body></worldbody></mujoco>"""
+    robot = load(mjcf, floating=floating, feet=())
+    assert robot.is_floating == floating
+    assert np.allclose(robot.standing().point("link"), [0.0, 0.0, 3.0])
+
+
 def test_the_robot_is_the_free_body_with_joints_or_what_is_attached_to_the_world(load, quadruped):
     ball = "<body name='ball'><freejoint/><geom size='0.1'/></body></worldbody>"
     with warns(RobotWarning, "ball"):
@@ -197,6 +247,8 @@ def test_the_robot_is_the_free_body_with_joints_or_what_is_attached_to_the_world
         (pendulum(rest='<option gravity="0 0 -1.6"/>'), -1.6),
         (pendulum(rest='<option><flag gravity="disable"/></option>'), 9.81),
         (pendulum('<joint name="swing" stiffness="3"/>'), "swing"),
+        (pendulum('<joint name="swing" stiffness="0 3"/>'), "swing"),
+        (pendulum('<joint name="swing" damping="0 3"/>'), "swing"),
         (pendulum('<joint name="loose" type="free" armature="1"/>'), "loose"),
         (pendulum(rest='<equality><weld name="bolt" body1="link"/></equality>'), "bolt"),
         (
