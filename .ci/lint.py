@@ -344,7 +344,7 @@ def _numbers(ranges: str) -> set[str]:
 
 # largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
 BUDGETS = {
-    "library": 15700, "lessons": 12700, "viewer": 4100, "tests": 22000, "benchmarks": 2450,
+    "library": 15870, "lessons": 12700, "viewer": 4100, "tests": 22100, "benchmarks": 2450,
     "docstrings": 16000,
 }  # fmt: skip
 

@@ -7,6 +7,7 @@ import shlex
 import signal
 import sys
 import threading
+import warnings
 import webbrowser
 from collections.abc import Sequence
 from contextlib import closing
@@ -103,6 +104,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if further and options.command != "lab":
         parser.error(f"unrecognized arguments: {' '.join(further)}")
     given = sys.argv[1:] if arguments is None else arguments
+    warnings.showwarning = lambda message, *_, **__: print(
+        f"floatbase: {message}", file=sys.stderr, flush=True
+    )
     if options.command == "lab" and _folder_may_be_a_value(given[1:]):
         parser.error("Name the folder of `lab` first, and write options as in --port=9000.")
     try:
@@ -173,13 +177,15 @@ def _posture(entries: Sequence[str], robot: str) -> dict[str, float] | str | Non
         return entries[0]
     angles = {}
     for entry in entries:
-        joint, _, angle = entry.rpartition("=")
+        joint, equals, angle = entry.rpartition("=")
         try:
+            if not equals or joint in angles:
+                raise ValueError
             angles[joint] = float(angle)
         except ValueError:
             raise fb.FloatbaseError(
-                f"--posture has {entry!r}. Write the name of a joint and its position, as in "
-                f"'*_knee=0.6', or alone the name of a keyframe of an MJCF."
+                f"--posture has {entry!r}. Write the name of each joint once with its position, as "
+                f"in '*_knee=0.6', or only the name of a keyframe of an MJCF."
             ) from None
     return angles or None
 

@@ -20,7 +20,7 @@ ROOT = PACKAGE.parent
 # from the lowest; packages of one layer may import each other
 LAYERS = """
     conventions errors _validation _assets _browser _files _geometry _locks affine linear_algebra
-    qp
+    qp _blas
     robots
     dynamics
     objectives

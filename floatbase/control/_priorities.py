@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -15,6 +14,7 @@ from floatbase.errors import InputError
 from floatbase.linear_algebra import null_space
 from floatbase.objectives import Task
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
+from floatbase.qp._changed import changed
 from floatbase.qp._levels import in_residuals
 
 # A smaller multiplier may be a rounding error. The bounds are a fraction of the largest slope that
@@ -65,6 +65,8 @@ def solve_levels(
 ) -> list[Solution]:
     """Solve the QP of each priority level, subject to the optima of the levels before.
 
+    `Solution.solver` names the fallback if the solver failed in this level or an earlier one.
+
     The optimum of a level has the same residuals wherever it is attained, because the cost is
     strictly convex in them. The next level therefore keeps the residuals, not the variables. An
     inequality with a positive multiplier is active at all these optima, so the next level keeps it
@@ -76,13 +78,17 @@ def solve_levels(
     free, x = qps[0].equality_space
     kept: dict[str, float] = {}
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
-        level = replace(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
+        level = changed(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
         change, T, rank = in_residuals(level, terms, free, x)
         found = solve(change, solver)
         x = x + T @ found.x
         before = solutions[-1].violations if solutions else {}
-        solution = replace(found, qp=level, x=x, earlier_violations=before)
-        solutions.append(replace(solution, earlier_multipliers=dict(kept)))
+        # a fallback of an earlier level is reported in the later ones, too
+        slowest = solutions[-1].solver if solutions and found.solver == solver else found.solver
+        solution = Solution(
+            level, x, found.inequality_multipliers, slowest, found.iterations, before, dict(kept)
+        )
+        solutions.append(solution)
         # soft rows keep their violation, and all rows the rounding of the solver: the optimum of
         # this level is a feasible point of the next
         h, penalties = np.maximum(h, qp.G @ x + FEASIBILITY_TOLERANCE * qp.row_norms), None

@@ -382,7 +382,10 @@ class WholeBodyController:
         Returns
         -------
         QP
-            The QP in x = (q̈, τ, λ); with priority levels, that of the last level.
+            The QP in x = (q̈, τ, λ); with priority levels, that of the last level. Soft
+            inequalities have a finite entry in its `penalties`. To solve it with another solver,
+            pass `qp.with_slacks()` to that solver: H, g, A, b, G and h alone are a problem in which
+            all inequalities are hard.
         """
         return self._problem.qp(state, t)
 

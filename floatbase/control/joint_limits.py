@@ -253,11 +253,17 @@ class JointLimits(Value):
         """
         size = self.lower.shape
         q, v = as_array("q", q, size), as_array("v", v, size)
-        largest = self._upper_bounds(self.upper - q, v)[0]
-        least = -self._upper_bounds(q - self.lower, -v)[0]
+        return self._bounds_and_kinds(q, v)[:2]
+
+    def _bounds_and_kinds(self, q: Array, v: Array) -> tuple[Array, Array, npt.NDArray[np.intp]]:
+        """Return the bounds of `bounds`, and the kinds of the upper and the lower ones, (2, d)."""
+        (largest, opposite), kinds = self._upper_bounds(
+            np.array([self.upper - q, q - self.lower]), np.array([v, -v])
+        )
+        least = -opposite
         conflict = least > largest  # as in a locked joint
         least[conflict] = largest[conflict] = 0.5 * (least[conflict] + largest[conflict])
-        return least, largest
+        return least, largest, kinds
 
     def near(self, state: State, fraction: float) -> npt.NDArray[np.bool_]:
         """Return which joints are near a position limit, or beyond it.
@@ -315,9 +321,10 @@ class JointLimits(Value):
         return joint_positions(robot, state.q), state.v[robot.nv - robot.d :]
 
     def _upper_bounds(self, gap: Array, v: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-        """Return the largest accelerations towards a limit, (d,), and the index of their kind.
+        """Return the largest accelerations towards limits, (2, d), and the index of their kind.
 
-        gap: distance to the limit [rad or m], (d,). v: velocity towards it [rad/s or m/s], (d,).
+        gap: distance to the limits [rad or m], (2, d). v: velocity towards them [rad/s or m/s],
+        (2, d).
         """
         dt, (brake, most) = self.period, self.decelerations
         stop = -v / dt  # at rest after one period
@@ -331,38 +338,9 @@ class JointLimits(Value):
             viable = (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt)
         viable = np.where(square >= 0.0, np.maximum(viable, stop), stop)
         position = np.where(np.isfinite(gap), np.minimum(position, viable), np.inf)
-        each = np.array([position, (self.speeds - v) / dt, self.acceleration])
+        acceleration = np.broadcast_to(self.acceleration, v.shape)
+        each = np.array([position, (self.speeds - v) / dt, acceleration])
         return np.maximum(each.min(axis=0), -most), each.argmin(axis=0)
-
-    def labels(self, names: tuple[str, ...], q: Array, v: Array) -> tuple[ConstraintLabel, ...]:
-        """Return the names of the upper bounds, then of the lower bounds.
-
-        Parameters
-        ----------
-        names : tuple of str
-            Names of the joints.
-        q : ndarray, shape (d,)
-            Joint positions [rad or m].
-        v : ndarray, shape (d,)
-            Joint velocities [rad/s or m/s].
-
-        Returns
-        -------
-        tuple of ConstraintLabel
-            Names such as "FL_calf_joint position upper", for bounded joints only. The second word
-            names the strictest limit in this state.
-        """
-        _, upper_kinds = self._upper_bounds(self.upper - q, v)
-        _, lower_kinds = self._upper_bounds(q - self.lower, -v)
-        labels = []
-        sides = zip(("upper", "lower"), (upper_kinds, lower_kinds), self.bounded, strict=True)
-        for side, kinds, bounded in sides:
-            for i in np.flatnonzero(bounded):
-                kind, joint = _KINDS[kinds[i]], names[i]
-                labels.append(
-                    ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
-                )
-        return tuple(labels)
 
     def rows(self, state: State) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
         """Return G, h and names of the inequalities G q̈ ≤ h at a state.
@@ -379,14 +357,25 @@ class JointLimits(Value):
         h : ndarray, shape (m,)
             Right-hand side [rad/s² or m/s²].
         names : tuple of ConstraintLabel
-            Names of the rows.
+            Names such as "FL_calf_joint position upper". The second word names the strictest limit
+            in this state.
         """
         q, v = self._joints_of(state)
         robot = state.robot
-        least, largest = self.bounds(q, v)
+        least, largest, kinds = self._bounds_and_kinds(q, v)
         upper, lower = self.bounded
         h = np.concatenate([largest[upper], -least[lower]])
-        return _selection(robot, self), h, self.labels(robot.joint_names, q, v)
+        labels = tuple(
+            _label(robot.joint_names[i], _KINDS[kinds[side, i]], ("upper", "lower")[side])
+            for side, i in np.argwhere(self.bounded).tolist()
+        )
+        return _selection(robot, self), h, labels
+
+
+@lru_cache(maxsize=4096)
+def _label(joint: str, kind: str, side: str) -> ConstraintLabel:
+    """Return the name of a row."""
+    return ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:

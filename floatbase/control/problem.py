@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 
+from floatbase._blas import one_blas_thread
 from floatbase._validation import (
     Array,
     Value,
@@ -41,6 +42,7 @@ from floatbase.objectives import (
     effort_weight,
 )
 from floatbase.qp import QP, ConstraintLabel, Solution, solve
+from floatbase.qp._changed import changed
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 
@@ -158,7 +160,9 @@ class Problem(Value):
         -------
         QP
             The QP in x = (q̈, τ, λ). With priority levels it is the QP of the last level, with the
-            optima of the other levels as equality constraints.
+            optima of the other levels as equality constraints. Soft inequalities, such as joint
+            limits by default, have a finite entry in its `penalties`. To solve it with another
+            solver, pass `qp.with_slacks()` to that solver.
 
         Raises
         ------
@@ -176,6 +180,7 @@ class Problem(Value):
         eom = equations_of_motion(state, self.contacts, t)
         return modified_qp(self, build_qp(eom, self.tasks, self.limits, t), eom)
 
+    @one_blas_thread()
     def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
         """Solve the QPs of all priority levels at a state and a time.
 
@@ -212,7 +217,11 @@ class Problem(Value):
         ]
         inequalities = [each.at(eom, t) for each in self.limits.all_inequalities(self.contacts)]
         bounds = self.limits.hard_normal_forces(self.contacts, t)
-        qps = [assemble_qp(eom, terms, self.limits, bounds, inequalities) for terms in costs]
+        first = assemble_qp(eom, costs[0], self.limits, bounds, inequalities)
+        qps = [first]
+        for terms in costs[1:]:
+            H, g = _objective(terms, first.blocks, first.n)
+            qps.append(changed(first, H=H, g=g))
         return solve_levels(qps, levels, costs, solver)
 
     def _check_robot(self, state: State) -> None:
@@ -268,7 +277,8 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
     Returns
     -------
     QP
-        The QP in x = (q̈, τ, λ).
+        The QP in x = (q̈, τ, λ). Soft inequalities have a finite entry in its `penalties`. To solve
+        it with another solver, pass `qp.with_slacks()` to that solver.
 
     Raises
     ------
@@ -333,13 +343,11 @@ def assemble_qp(
     nv, d, k = eom.nv, eom.d, eom.k
     blocks = {"qdd": slice(0, nv), "tau": slice(nv, nv + d), "forces": slice(nv + d, nv + d + k)}
     n = nv + d + k
-    H, g = np.zeros((n, n)), np.zeros(n)
-    for each, weight, residual in costs:
-        block = blocks[each]
-        H[block, block] += weight * residual.A.T @ residual.A
-        g[block] += weight * residual.A.T @ residual.b
+    H, g = _objective(costs, blocks, n)
     motion, b = _resolved_motion_rows(eom)
-    A = np.block([[eom.M, -eom.S, -eom.J.T], [motion, np.zeros((len(motion), d + k))]])
+    A = np.zeros((nv + len(motion), n))
+    A[:nv, :nv], A[:nv, nv : nv + d], A[:nv, nv + d :] = eom.M, -eom.S, -eom.J.T
+    A[nv:, :nv] = motion
     G_force, names = force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
     blocks_of_G: list[tuple[Block, Array, Array]] = [
@@ -368,6 +376,16 @@ def assemble_qp(
     b, equality_names = np.concatenate([-eom.h, b]), _equality_names(eom.robot, eom.contacts)
     soft = penalties if any(weights) else None
     return QP(H, g, A, b, G, h, equality_names, names, blocks, soft)
+
+
+def _objective(costs: Costs, blocks: Mapping[str, slice], n: int) -> tuple[Array, Array]:
+    """Return H and g of the sum of (weight / 2) ‖residual‖² in n variables."""
+    H, g = np.zeros((n, n)), np.zeros(n)
+    for each, weight, residual in costs:
+        block, weighted = blocks[each], weight * residual.A.T
+        H[block, block] += weighted @ residual.A
+        g[block] += weighted @ residual.b
+    return 0.5 * (H + H.T), g
 
 
 @contextmanager

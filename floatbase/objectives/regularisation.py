@@ -12,7 +12,7 @@ from floatbase.objectives._task import Shape, Shapes, Target, TargetTask
 from floatbase.robots import Robot
 
 _WEIGHT = 1e-5  # 1/N² and 1/(N·m)²
-# N: with the weight 1e-5, standing robots of more weight sag, since forces cost more than motion
+# N: with the weight 1e-5, heavier robots sag when they stand, since forces cost more than motion
 _MAX_LOAD = 400.0
 
 

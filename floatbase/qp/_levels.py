@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -38,15 +39,11 @@ def in_residuals(
     g, G = np.zeros(n), level.G @ free
     g[:rank] = unit * (U[:, :rank].T @ weighted[:, -1])
     G[np.linalg.norm(G, axis=1) <= _ROW_TOLERANCE * level.row_norms] = 0.0
-    change = InequalityQP(
-        np.diag(np.where(np.arange(n) < rank, unit**2, 0.0)),
-        g,
-        np.zeros((0, n)),
-        np.zeros(0),
-        G @ columns,
-        level.h - level.G @ x,
-        inequality_names=level.inequality_names,
-        penalties=level.penalties,
+    change = InequalityQP._unchecked(
+        H=np.diag(np.where(np.arange(n) < rank, unit**2, 0.0)), g=g,
+        A=np.zeros((0, n)), b=np.zeros(0), G=G @ columns, h=level.h - level.G @ x,
         row_norms=level.row_norms,
-    )
+        equality_names=(), inequality_names=level.inequality_names, blocks=MappingProxyType({}),
+        penalties=level.penalties,
+    )  # fmt: skip
     return change, free @ columns, rank

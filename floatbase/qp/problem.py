@@ -27,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -122,6 +122,16 @@ class QP(Value):
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
+    @classmethod
+    def _unchecked(cls, **values: Any) -> Self:
+        """Make a problem from values that are known to fit, without checking them again."""
+        qp = object.__new__(cls)
+        for name, value in values.items():
+            object.__setattr__(
+                qp, name, read_only(value) if isinstance(value, np.ndarray) else value
+            )
+        return qp
+
     def without(self, *kinds: str) -> QP:
         """Return the same problem without the inequality constraints of some kinds.
 
@@ -168,7 +178,7 @@ class QP(Value):
         return found
 
     def with_slacks(self) -> QP:
-        """Return the equivalent problem with hard inequalities only.
+        """Return the equivalent problem with hard inequalities only, for any QP solver.
 
         Returns
         -------
@@ -235,6 +245,8 @@ class QP(Value):
         unit length, so multiplying an equation by a number changes nothing. Inconsistent equations
         raise an `InfeasibleError` that names them.
         """
+        if not len(self.A):
+            return Affine(np.eye(self.n), np.zeros(self.n))
         size = row_norms(self.A)
         A, b = self.A / size[:, None], self.b / size
         U, s, Vt, rank = svd_with_rank(A)
@@ -299,16 +311,6 @@ class InequalityQP(QP):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "row_norms", as_array("row_norms", self.row_norms, (len(self.G),)))
-
-    @classmethod
-    def _unchecked(cls, **values: Any) -> InequalityQP:
-        """Make a problem from values that are known to fit, without checking them again."""
-        qp = object.__new__(cls)
-        for name, value in values.items():
-            object.__setattr__(
-                qp, name, read_only(value) if isinstance(value, np.ndarray) else value
-            )
-        return qp
 
 
 def _as_penalties(penalties: npt.ArrayLike, count: int) -> Array:

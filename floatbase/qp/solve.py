@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from floatbase._validation import Array, as_instance
 from floatbase.errors import InfeasibleError, SolverError, require, unknown_name
+from floatbase.qp._changed import changed
 from floatbase.qp.active_set import active_set
 from floatbase.qp.conflicts import (
     FEASIBILITY_TOLERANCE,
@@ -29,15 +30,16 @@ from floatbase.qp.solution import Solution
 _CLARABEL_TOLERANCES = (1e-12, 1e-10, 1e-8)
 # fraction of the largest |H| by which a curvature may be negative: rounding of the pullback
 _CONVEXITY_TOLERANCE = 1e-10
-# fraction of 1 + the largest variable by which polishing may change a variable: a larger step
-# would be more than a correction of the last digits
+# fraction of 1 + the largest variable by which the last step of polishing may change a variable:
+# after a larger one, the next would be more than a correction of the last digits
 _MAX_POLISHING_STEP = 1e-4
 _RANK_TOLERANCE = 1e-12  # of a singular system of optimality conditions, relative
 _ROUNDING = 1e-14  # fraction of the terms of a slope that may be rounding
 _STATIONARITY = 1e-12  # fraction of its largest term that the slope at an optimum may have
 # of the distance from the last point, which DAQP adds to the objective, relative to the largest
 # curvature. The first is for an objective without curvature in some direction; larger ones can take
-# thousands of iterations. The others are for problems in which DAQP cycles with the first
+# thousands of iterations. The others are for problems in which DAQP cycles with the first or finds
+# other active rows than the optimum has
 _PROXIMAL_WEIGHTS = -1e-6, 1e-5, 1e-4
 # DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
 # 4 s on a loaded machine, and it was never seen to need more than 155
@@ -115,8 +117,8 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
             return exact
     found = solve(relaxed, solver)
     exact = _solve_with_known_violations(qp, _violations(qp, found), solver)
-    if exact is not None:
-        return exact
+    if exact is not None:  # a fallback that found the violations took its time
+        return exact if found.solver == solver else replace(exact, solver=found.solver)
     multipliers = found.inequality_multipliers[: len(qp.G)]
     return Solution(qp, found.x[: qp.n], multipliers, found.solver, found.iterations)
 
@@ -140,7 +142,7 @@ def _solve_with_known_violations(
     assert qp.penalties is not None
     sign = np.where(violated, -1.0, 1.0)
     penalties = np.where(violated, qp.penalties, 0.0)
-    hard = replace(
+    hard = changed(
         qp, g=qp.g + qp.G.T @ penalties, G=sign[:, None] * qp.G, h=sign * qp.h, penalties=None
     )
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
@@ -187,9 +189,9 @@ def check_solver(solver: str) -> None:
 def _daqp(qp: QP, polish: bool = True) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
-    If polishing fails, `active_set` continues from DAQP's result. Return None if weights are so far
-    apart that DAQP does not converge. Also return None if DAQP reports infeasibility, since it may
-    mistake small curvature for it.
+    If polishing fails for all proximal weights, `active_set` continues from DAQP's first result.
+    Return None if weights are so far apart that DAQP does not converge. Also return None if DAQP
+    reports infeasibility, since it may mistake small curvature for it.
     """
     import daqp
 
@@ -198,6 +200,7 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
         only = _polished(qp, np.zeros(0), np.zeros(rows))
         return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
+    first: tuple[Array, Array] | None = None
     for proximal_weight in _PROXIMAL_WEIGHTS:  # a negative one: only if curvature is missing
         y, _, exit_flag, info = daqp.solve(
             reduced.H / scale,
@@ -210,24 +213,26 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
             eps_prox=proximal_weight,
             iter_limit=_DAQP_ITERATIONS,
         )
-        if exit_flag not in (-2, -4):  # cycling, too many iterations
+        if exit_flag in (-2, -4):  # cycling, too many iterations
+            continue
+        if exit_flag not in (1, 2):
             break
+        y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
+        if not polish:
+            return Solution(qp, qp.equality_space(y), mu, "daqp", int(info["iterations"]))
+        polished = _polished(qp, y, mu)
+        if polished is not None:
+            return Solution(qp, *polished, "daqp", int(info["iterations"]))
+        first = first or (y, mu)
+    if first is not None:
+        guess = [qp.inequality_names[i] for i in np.flatnonzero(first[1])]
+        return _active_set(qp, first[0], guess, _FALLBACK_ITERATIONS)
     if exit_flag == -3:
         raise unbounded(qp)
     if exit_flag == -5:
         raise not_convex(qp, reduced.H)
-    if exit_flag not in (1, 2):
-        # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
-        return None
-    y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-    iterations = int(info["iterations"])
-    if not polish:
-        return Solution(qp, qp.equality_space(y), mu, "daqp", iterations)
-    polished = _polished(qp, y, mu)
-    if polished is None:
-        guess = [qp.inequality_names[i] for i in np.flatnonzero(mu)]
-        return _active_set(qp, y, guess, _FALLBACK_ITERATIONS)
-    return Solution(qp, *polished, "daqp", iterations)
+    # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
+    return None
 
 
 def _active_set(
@@ -319,7 +324,8 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
 
     Return None if the steps do not end at an optimum, because its active rows are others.
     """
-    for unique in (True, False):
+    # without curvature in some direction, the equations nearly always leave something open
+    for unique in (True, False) if np.all(np.diag(qp.reduced.H)) else (False,):
         with suppress(np.linalg.LinAlgError):
             polished = _after_newton_steps(qp, y, mu, unique)
             if polished is not None:
@@ -330,10 +336,11 @@ def _polished(qp: QP, y: Array, mu: Array) -> tuple[Array, Array] | None:
 def _after_newton_steps(qp: QP, y: Array, mu: Array, unique: bool) -> tuple[Array, Array] | None:
     """Return x and μ after two Newton steps, or None if they are not an optimum.
 
-    If the optimum or its multipliers are not unique, the steps are the shortest ones. No step may
-    be too large for rounding. With weights from 1e-8 to 1, the reduced H leaves few digits for the
-    slope. Here the slope is summed in extended precision, if the processor supports it, from the
-    original problem.
+    If the optimum or its multipliers are not unique, the steps are the shortest ones. The first may
+    be long, since DAQP's proximal weight can move its point along directions of little slope.
+    The last step must be small enough for rounding. With weights from 1e-8 to 1, the reduced H
+    leaves few digits for the slope. Here the slope is summed in extended precision, if the
+    processor supports it, from the original problem.
     """
     reduced, space, n, size = qp.reduced, qp.equality_space, len(y), qp.row_norms
     active = np.flatnonzero(mu > 0.0)
@@ -354,21 +361,24 @@ def _after_newton_steps(qp: QP, y: Array, mu: Array, unique: bool) -> tuple[Arra
             else units
             * np.linalg.lstsq(units[:, None] * K * units, units * residual, _RANK_TOLERANCE)[0]
         )
-        if not np.max(np.abs(step[:n]), initial=0.0) < _MAX_POLISHING_STEP * (
-            1.0 + np.max(np.abs(y), initial=0.0)
-        ):
-            return None
         values -= step
+    largest = 1.0 + np.max(np.abs(values[:n]), initial=0.0)
+    if not np.max(np.abs(step[:n]), initial=0.0) < _MAX_POLISHING_STEP * largest:
+        return None
     polished = np.zeros_like(mu)
     polished[active] = np.maximum(values[n:].astype(np.float64), 0.0)
     point = space(values[:n].astype(np.float64))
     parts = qp.H @ point, qp.g, qp.G.T @ polished
-    rounding = _ROUNDING * np.max(np.abs(qp.H) @ (1.0 + np.abs(point)), initial=0.0)
+    # multipliers of nearly parallel rows are large, and their sum is not
+    terms = np.abs(qp.H) @ (1.0 + np.abs(point)) + np.abs(qp.G).T @ polished
+    rounding = _ROUNDING * np.max(terms, initial=0.0)
     is_steep = (
         np.abs(space.A.T @ sum(parts))
         > _STATIONARITY * np.max(np.abs(parts), initial=0.0) + rounding
     )
-    is_outside = (qp.G @ point - qp.h) / size > violation_tolerance(qp.h / size, point)
+    excess = (qp.G @ point - qp.h) / size
+    excess[polished > 0.0] = np.abs(excess[polished > 0.0])
+    is_outside = excess > violation_tolerance(qp.h / size, point)
     return None if np.any(is_steep) or np.any(is_outside) else (point, polished)
 
 

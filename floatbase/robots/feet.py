@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from floatbase._validation import Array, as_positive, short_repr
 from floatbase.errors import InputError
 from floatbase.robots._checks import clamp_to_limits, has_floating_base, joint_limits
 from floatbase.robots._shapes import link_shapes, placed_points
+from floatbase.robots.inertia import origin_attributes
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
@@ -76,6 +78,35 @@ def as_feet(
         else Foot(foot, radius or 0.0)
         for foot in requested
     )
+
+
+def with_foot_links(
+    model: pin.Model, urdf: str, feet: Sequence[Foot]
+) -> tuple[str, tuple[Foot, ...]]:
+    """Give each ball that its link's origin is not in a link of its own, in the URDF and the model.
+
+    A swing moves the origin of a foot's frame, which is the knee if the ball belongs to the calf.
+    """
+    root, placed = ElementTree.fromstring(urdf), list(feet)
+    for i, foot in enumerate(feet):
+        is_ball = not foot.is_flat and foot.axis is None
+        if not is_ball or np.linalg.norm(foot.centre) <= foot.radius:
+            continue
+        if not model.existFrame(foot.frame, pin.BODY):
+            continue
+        name, link = f"{foot.frame} foot", model.getFrameId(foot.frame, pin.BODY)
+        offset, frame = pin.SE3(np.eye(3), np.array(foot.centre)), model.frames[link]
+        model.addFrame(pin.Frame(name, frame.parentJoint, link, frame.placement * offset, pin.BODY))
+        ElementTree.SubElement(root, "link", name=name)
+        joint = ElementTree.SubElement(root, "joint", name=f"{name} weld", type="fixed")
+        for tag, attributes in (
+            ("origin", origin_attributes(offset)),
+            ("parent", {"link": foot.frame}),
+            ("child", {"link": name}),
+        ):
+            ElementTree.SubElement(joint, tag, attributes)
+        placed[i] = Foot(name, foot.radius)
+    return ElementTree.tostring(root, encoding="unicode"), tuple(placed)
 
 
 def with_bent_legs(robot: Robot) -> Robot:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Mapping, Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
-from floatbase.robots.feet import as_feet, with_bent_legs
+from floatbase.robots.feet import as_feet, with_bent_legs, with_foot_links
 from floatbase.robots.plausibility import missing_meshes_message, passive_joints_message, problems
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.urdf import (
@@ -49,6 +50,7 @@ def catalogue() -> dict[str, str]:
 
 def load(
     name: str | Path,
+    /,
     *,
     feet: Sequence[str | Foot] | None = None,
     foot_radius: float | None = None,
@@ -119,6 +121,11 @@ def load(
 
     name = str(name) if isinstance(name, Path) else name
     load_file = _file_loader(name)
+    known = signature(load_file).parameters if load_file else ()
+    unknown = [option for option in file_options if option not in known]
+    if unknown:
+        kind = f"fb.{load_file.__name__}" if load_file else "A robot that is loaded by its name"
+        raise InputError(f"{kind} has no option {', '.join(unknown)}. Leave it out.")
     if load_file is not None:
         return load_file(
             name,
@@ -128,10 +135,6 @@ def load(
             posture=posture,
             locked=locked,
             **file_options,
-        )
-    if file_options:
-        raise InputError(
-            f"{', '.join(file_options)}: only robots from a file have these options, not {name}."
         )
     loader = _find_loader(name, data.robots_loader.ROBOTS)
     entry = CATALOGUE.get(name, CatalogueEntry(""))
@@ -164,10 +167,11 @@ def _file_loader(path: str) -> Callable[..., Robot] | None:
     endings = *_FILE_ENDINGS, ".xacro", ".sdf"  # of these, load_urdf says what to run first
     if not isinstance(path, str) or not path.lower().endswith(endings):
         return None
+    text = read_text(Path(os.path.expanduser(path)))
     try:
-        tag = ElementTree.fromstring(read_text(Path(os.path.expanduser(path)))).tag
-    except ElementTree.ParseError:
-        tag = ""  # load_urdf describes the error
+        tag = ElementTree.fromstring(text).tag
+    except ElementTree.ParseError:  # the function that loads the file describes the error
+        tag = "mujoco" if "<mujoco" in text and "<robot" not in text else ""
     return load_mjcf if tag == "mujoco" else load_urdf
 
 
@@ -424,6 +428,8 @@ def _make_robot(
         torque_limits = np.where(effort > 0, effort, np.inf)  # 0 means unknown
     posture = as_posture(name, model, posture)
     found = as_feet(feet, foot_radius, model, urdf, package_dirs, posture, known_feet)
+    if known_feet is None:
+        urdf, found = with_foot_links(model, urdf, found)
     robot = Robot(name, model, urdf, package_dirs, found, torque_limits, posture, **fields)  # type: ignore[arg-type]  # it checks
     if choose_posture and bend_legs:
         robot = with_bent_legs(robot)

@@ -59,6 +59,8 @@ def read_mjcf(name: str, file: Path, floating: bool | None, keyframe: str | None
         # welded bodies are links, and visual geoms are drawn
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         compiled = spec.compile()
+        if not np.isfinite([*compiled.qpos0, *compiled.key_qpos.flat]).all():
+            raise ValueError("a position of a body, a joint or in a keyframe is not finite.")
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{file} cannot be read as an MJCF: {error}") from None
     writer = _Writer(name, compiled, spec, folder, bool(floating))

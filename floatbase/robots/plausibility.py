@@ -10,17 +10,19 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.errors import InputError
 from floatbase.qp import QP, solve
+from floatbase.robots._checks import joint_limits
 from floatbase.robots._shapes import missing_meshes
 from floatbase.robots.feet import singular_legs
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
 
-# kg/m³, mass over the cube of the robot's size: robots have 10 to 200, and air has 1.2. In
-# centimetres it is a millionth, and in inches a 60 000th.
+# kg/m³, mass over the cube of the robot's size: robots have 10 to 200, and air has 1.2.
+# With lengths in centimetres it would be a millionth, and in inches a 60 000th.
 _MIN_DENSITY = 0.01
 # of the forces and moments that balance the robot, relative to the largest fraction of a torque
 # limit; and of the forces themselves, which makes them unique
 _BALANCE_WEIGHT, _FORCE_WEIGHT = 1e6, 1e-6
+_MANY_TURNS = 30.0  # rad: solo12 has 20, and hardly a joint turns by only 30 degrees
 _TOLERANCE = 1e-2  # fraction of a torque limit by which the torques of the QP may be wrong
 
 
@@ -38,6 +40,7 @@ def problems(robot: Robot, given_feet: Sequence[str | Foot], may_bend: bool) -> 
         or _upside_down_message(robot, posture)
         or _weak_motors_message(robot),
         _points_message(robot, given_feet),
+        _degrees_message(robot),
     ]
 
 
@@ -51,6 +54,17 @@ def _straight_legs_message(robot: Robot) -> str:
         f"posture, for example straight. They cannot move their feet in all directions. Pass a "
         f'posture with bent legs, such as posture={{"name of a knee": 0.6}}, or the positions of '
         f"all joints."
+    )
+
+
+def _degrees_message(robot: Robot) -> str:
+    """Return a warning if most joints can turn so far that their limits are in degrees, else ""."""
+    _, _, lower, upper = joint_limits(robot.model)
+    if not _MANY_TURNS < np.median(np.append(upper - lower, 0.0)) < 2 * 360:
+        return ""
+    return (
+        f"Most joints of {robot.name} can turn by many turns. Their limits are probably in "
+        f"degrees. Write them in radians, and check the velocities."
     )
 
 
@@ -73,9 +87,9 @@ def missing_meshes_message(robot: Robot) -> str:
         return ""
     more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
     return (
-        f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Its link is "
-        f"represented by other shapes or a box. Give the folder that contains the meshes or "
-        f"their package, as in package_dirs=[…]."
+        f"The mesh file {missing[0]!r}{more} of {robot.name} does not exist. Links "
+        f"without their meshes are drawn as other shapes or boxes. Pass the folder that contains "
+        f"the meshes or their package, as in package_dirs=[…]."
     )
 
 
@@ -86,14 +100,14 @@ def _points_message(robot: Robot, given_feet: Sequence[str | Foot]) -> str:
         return ""
     names = [foot.frame for foot in robot.feet]
     advice = (
-        f"If it has soles, give their corners, as in "
+        f"If it has soles, pass their corners, as in "
         f"feet=[floatbase.robots.Foot({names[0]!r}, corners=[…]), …]."
         if robot.feet[0].axis is None
-        else "Its wheels must move to balance it, which no task of floatbase does."
+        else "Its wheels must move to balance it, and floatbase has no task for this."
     )
     return (
-        f"{robot.name} cannot stand still, because it touches the ground at {len(names)} "
-        f"point(s) only: {', '.join(names)}. {advice}"
+        f"{robot.name} cannot stand still on points: it touches the ground only at "
+        f"{' and '.join(names)}. {advice}"
     )
 
 
@@ -142,9 +156,10 @@ def _upside_down_message(robot: Robot, posture: State) -> str:
     if upright:
         return ""
     return (
-        f"{robot.name} is upside down in its posture. If the posture begins with the position and "
-        f"the quaternion of the base, the order of the quaternion must be x, y, z, w. MuJoCo's "
-        f"order is w, x, y, z: an upright base is 0, 0, 0, 1 here, and 1, 0, 0, 0 there."
+        f"{robot.name} is upside down in its posture, or its feet are not below its centre of "
+        f"mass. If the posture begins with the position and the quaternion of the base, the order "
+        f"of the quaternion must be x, y, z, w. MuJoCo's order is w, x, y, z: an upright base is "
+        f"0, 0, 0, 1 here, and 1, 0, 0, 0 there."
     )
 
 
@@ -178,7 +193,7 @@ def _weak_motors_message(robot: Robot) -> str:
         return ""
     return (
         f"{robot.name} cannot stand: its motors are too weak to carry it on its feet (N·m or N): "
-        f"{weak}. Check masses, lengths and the effort of the joints in the URDF, or "
+        f"{weak}. Check masses, lengths and the torque limits of the joints in the file, or "
         f"pass torque_limits."
     )
 

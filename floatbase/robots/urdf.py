@@ -13,7 +13,7 @@ from pathlib import Path
 import pinocchio as pin
 
 from floatbase._files import read_file
-from floatbase._validation import Array, short_repr
+from floatbase._validation import MAX_MAGNITUDE, Array, short_repr
 from floatbase.errors import InputError, RobotWarning, warn
 from floatbase.robots._checks import has_floating_base
 from floatbase.robots.inertia import origin_attributes, read_inertia, read_numbers
@@ -50,11 +50,13 @@ _NUMBERS = {
     "mesh": {"scale": 3},
     "color": {"rgba": 4},
 }
+_NOT_NEGATIVE = ("value", "effort", "velocity", "damping", "friction", "size", "radius", "length")
 _REQUIRED = {"joint": ("parent", "child"), "inertial": ("mass", "inertia")}
 # attributes with a default; all other attributes of an element are required
 _OPTIONAL = ("xyz", "rpy", "lower", "upper", "damping", "friction", "multiplier", "offset", "scale")
-# what all readers take for the same number; Python's float() accepts more, such as 1_000
+# what all readers read as the same number; Python's float() accepts more, such as 1_000
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+_OLD_ENCODING = rb"(?i)<\?xml[^>]*encoding=.(iso-8859-1|iso-8859-15|windows-1252)\b"
 _INFINITY = re.compile(r"[+-]?inf(inity)?", re.IGNORECASE)
 _XACRO = "Run xacro first, as in `xacro robot.urdf.xacro > robot.urdf` (`pip install xacro`)."
 _OTHER_FORMATS = {
@@ -62,6 +64,7 @@ _OTHER_FORMATS = {
     "sdf": "This is an SDF file. Load the URDF from which it was made, or convert it, for example "
     "with `sdf2urdf` of the ROS package pysdf.",
 }
+_MOST_LINKS = 1000  # Pinocchio's recursion ends the program in a chain of about 4000
 # kg m²: some programs write -5e-20 for an inertia of 0, and every real part of a robot has more
 _ROUNDING = 1e-12
 
@@ -69,14 +72,18 @@ _ROUNDING = 1e-12
 def read_text(path: Path) -> str:
     """Read the text of a URDF or MJCF file."""
     try:
-        # a comment in another encoding does not change the robot
-        return read_file(path).decode("utf-8-sig", errors="replace")
+        data = read_file(path)
     except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
         reason = getattr(error, "strerror", None) or error
         raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Give the path of a URDF or "
+            f"The file {path.absolute()} cannot be read ({reason}). Pass the path of a URDF or "
             f"MJCF file."
         ) from None
+    encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    if declared := re.match(_OLD_ENCODING, data):
+        encoding = declared[1].decode()
+    # a comment in another encoding does not change the robot
+    return data.decode(encoding, errors="replace")
 
 
 def normalize_urdf(name: str, text: str, floating: bool) -> str:
@@ -117,6 +124,8 @@ def _parse_xml(name: str, text: str) -> Element:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
         hint = f" The file is written in xacro. {_XACRO}" if "xacro:" in text else ""
+        if "<robot" not in text:
+            hint = f" A URDF contains <robot>, but this text begins with {text[:40]!r}."
         raise InputError(f"{name} is not a valid URDF: {error}.{hint}") from None
     if any("xacro" in element.tag for element in root.iter()):
         raise InputError(f"{name} is not a URDF: the file is written in xacro. {_XACRO}")
@@ -124,7 +133,7 @@ def _parse_xml(name: str, text: str) -> Element:
     for element in root.iter():
         element.tag = element.tag.removeprefix(namespace)
     if root.tag != "robot":
-        hint = _OTHER_FORMATS.get(root.tag, "Give the path of a URDF file.")
+        hint = _OTHER_FORMATS.get(root.tag, "Pass the path of a URDF file.")
         raise InputError(
             f"{name} is not a URDF: its outermost element is <{root.tag}>, but it must be <robot>. "
             f"{hint}"
@@ -172,22 +181,26 @@ def _normalize_numbers(element: Element, where: str) -> None:
         if text is None and key in _OPTIONAL:
             continue
         words = (text or "").split()
-        if len(words) != count or not all(_is_number(word, element.tag) for word in words):
+        if len(words) != count or not all(_is_number(word, key) for word in words):
             found = f"no {key}" if text is None else f"{key}={text!r}"
-            needed = f"{count} numbers with blanks between them" if count > 1 else "a number"
-            needed += " ≥ 0" if element.tag == "mass" else ""
+            needed = f"{count} numbers, separated by blanks," if count > 1 else "a number"
+            least = 0.0 if key in _NOT_NEGATIVE else -MAX_MAGNITUDE
+            needed += f" from {least:g} to {MAX_MAGNITUDE:g}"
             hint = " Write decimals with a point." if "," in (text or "") else ""
             hint = f" The file is written in xacro. {_XACRO}" if "$" in (text or "") else hint
             raise InputError(f"<{element.tag}> of {where} has {found}, but needs {needed}.{hint}")
+        if element.tag == "limit" and abs(float(words[0])) > MAX_MAGNITUDE:
+            words = [str(math.copysign(math.inf, float(words[0])))]  # some programs write 1.8e308
         element.set(key, " ".join(words))
 
 
-def _is_number(word: str, tag: str) -> bool:
-    """Return whether all readers take a word for the same valid number."""
-    if tag == "limit" and _INFINITY.fullmatch(word):
-        return True
-    is_finite = _NUMBER.fullmatch(word) is not None and math.isfinite(float(word))
-    return is_finite and (tag != "mass" or float(word) >= 0.0)
+def _is_number(word: str, key: str) -> bool:
+    """Return whether all readers read a word as the same valid number."""
+    is_limit = key in _NUMBERS["limit"]
+    is_infinite = is_limit and _INFINITY.fullmatch(word) is not None
+    if not (is_infinite or _NUMBER.fullmatch(word)) or (key in _NOT_NEGATIVE and float(word) < 0.0):
+        return False
+    return is_limit or abs(float(word)) <= MAX_MAGNITUDE
 
 
 def _check_tree(name: str, root: Element) -> str:
@@ -197,11 +210,15 @@ def _check_tree(name: str, root: Element) -> str:
         for label, count in names.items():
             if count > 1 or not label:
                 raise InputError(
-                    f"{kind}s of {name} with the name {label!r}: {count}. Give each its own name."
+                    f"{name} has {count} {kind}s with the name {label!r}. Each needs a name of "
+                    f"its own."
                 )
     links = [link.get("name", "") for link in root.findall("link")]
-    if not links:
-        raise InputError(f"{name} has no <link>. Give the path of a URDF file with links.")
+    if not 0 < len(links) <= _MOST_LINKS:
+        raise InputError(
+            f"{name} has {len(links)} <link> elements. Pass the path of a URDF file with links, at "
+            f"most {_MOST_LINKS}."
+        )
     parents = {link: dict[str, str]() for link in links}  # of each link, by the joint between them
     for joint in root.findall("joint"):
         label, (parent, child) = joint.get("name", ""), _ends(joint)
@@ -259,7 +276,7 @@ def _normalize_joint(name: str, joint: Element) -> None:
     if axis is None:
         axis = ElementTree.SubElement(joint, "axis")
     axis.attrib.setdefault("xyz", "1 0 0")
-    if not any(read_numbers(axis, "xyz")):
+    if max(map(abs, read_numbers(axis, "xyz"))) < 1e-12:  # rounding error
         raise InputError(
             f'The <axis> of joint {label!r} of {name} is zero. Give a direction, as in xyz="0 0 1".'
         )

@@ -36,8 +36,8 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
             where = f", at the links {', '.join(links)}" if links else ""
             raise SimulationError(
                 f"MuJoCo's model of {robot.name} differs from Pinocchio's in "
-                f"{', '.join(different)}{where}. The controller would assume another robot than "
-                f"the simulated one. Load the robot again if its model was changed after loading."
+                f"{', '.join(different)}{where}. The controller would use another model than the "
+                f"simulation. Load the robot again if its model was changed after loading."
             )
 
 

@@ -67,8 +67,8 @@ class Simulation:
     timestep : float, optional
         Length of a step [s].
     joint_losses : bool, optional
-        Whether the damping and the dry friction of the joints act that the robot's file gives, as
-        in <dynamics damping="0.1" friction="0.5"/>. The equations and the controllers ignore them.
+        Whether the joint damping and dry friction in the robot's file act, as in
+        <dynamics damping="0.1" friction="0.5"/>. The equations and the controllers ignore them.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from messages import raises
 import floatbase as fb
 from floatbase.control import JointLimits, Limits, LinearInequality
 from floatbase.errors import InfeasibleError, InputError
+from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
 PERIODS = (1e-3, 2e-3, 4e-3)
@@ -273,6 +274,28 @@ def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind():
         both = judges.pair(robot, judges.stance(robot), inequalities=[rows, light])
         state = robot.random_state(int(rng.integers(1000)), 0.1)
         assert judges.difference(*both, state) < 1e-6 * robot.torque_limits.max()
+
+
+def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_problem_with_slacks():
+    cp = pytest.importorskip("cvxpy")
+    robot = judges.load("go2")
+    state, limits = robot.standing(), JointLimits.of(robot)
+    upper = np.array(limits.upper)
+    upper[2] = state.q[9] - 0.1
+    controller = judges.controller_of("go2", joint_limits=replace(limits, upper=upper))
+
+    def torques(qp: QP) -> np.ndarray:
+        """Return the torques that Clarabel finds for the arrays of a problem."""
+        x = cp.Variable(qp.n)
+        cost = 0.5 * cp.quad_form(x, cp.psd_wrap(qp.H)) + qp.g @ x
+        accuracy = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), 1e-11)
+        problem = cp.Problem(cp.Minimize(cost), [qp.A @ x == qp.b, qp.G @ x <= qp.h])
+        problem.solve("CLARABEL", **accuracy)
+        return x.value[qp.blocks["tau"]]
+
+    qp, command = controller.qp(state), controller(state.q, state.v)
+    assert np.allclose(torques(qp.with_slacks()), command.tau, rtol=0.0, atol=0.1)
+    assert command.violations and np.max(np.abs(torques(qp) - command.tau)) > 10.0
 
 
 def test_joint_limits_that_do_not_fit_are_refused():

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import judges
 import numpy as np
+import pytest
 
 import floatbase as fb
+from floatbase import _blas
 from floatbase.behaviours import Gait, Walk
 from floatbase.qp import QP
 
@@ -68,3 +70,26 @@ def test_a_walk_hands_it_to_the_controllers_of_all_stances():
     walk = Walk(GO2, judges.stance(GO2), Gait.trot(GO2, start=0.02), modify_qp=watch)
     record = fb.rollout(fb.Simulation(GO2, 0.7), walk, 0.4, control_period=4e-3)
     assert record.outcome == "completed" and {len(names) for names in seen} == {2, 4}
+
+
+@pytest.mark.skipif(_blas.SETTER is None, reason="numpy does not use OpenBLAS here")
+def test_a_reference_step_uses_one_blas_thread_and_leaves_the_number_as_it_was():
+    threads, inside = getattr(_blas.LIBRARY, _blas.SETTER.replace("set", "get")), []
+
+    def read(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+        inside.append(threads())
+        if len(inside) > 2:
+            raise ValueError
+        return qp
+
+    made, state = controller(modify_qp=read), GO2.standing()
+    before = threads()
+    getattr(_blas.LIBRARY, _blas.SETTER)(2)
+    try:
+        made(state.q, state.v)
+        assert inside[-1] == 1 and threads() == 2
+        with pytest.raises(ValueError):
+            made(state.q, state.v)
+        assert inside[-1] == 1 and threads() == 2
+    finally:
+        getattr(_blas.LIBRARY, _blas.SETTER)(before)

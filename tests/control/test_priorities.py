@@ -228,3 +228,29 @@ def test_tasks_of_one_name_can_be_in_several_levels():
     names = controller.qp(state).equality_names
     rows = [name for name in names if "orientation of base 0" in name]
     assert len(rows) == 3 and {label.owner for label in rows} == {first.name}
+
+
+@pytest.mark.parametrize("name", ["g1", "talos"])
+def test_levels_of_a_pushed_humanoid_need_no_fallback(name):
+    """Levels with small slopes, and rows that meet in one point, used to need `active_set`."""
+    robot = judges.load(name)
+    state, contacts = robot.standing(), judges.stance(robot)
+    first = [fb.CoMTask(state.com)], [fb.OrientationTask("base")], [fb.PostureTask(state.q)]
+    for levels in (first, ([*first[0], *first[1]], first[2])):
+        for stance in (contacts, contacts.only(contacts.names[0])):
+            controller = fb.WholeBodyController(robot, stance, list(levels))
+            pushed = [np.random.default_rng(seed).normal(0.0, 0.5, 3) for seed in range(4)]
+            solved = [
+                controller(state.q, np.append(push, np.zeros(robot.nv - 3))).solution.solver
+                for push in [np.zeros(3), *pushed]
+            ]
+            assert solved.count("daqp") >= len(solved) - 1
+
+
+def test_a_fallback_in_the_first_level_is_reported_by_the_last(monkeypatch):
+    robot = judges.load("go2")
+    state, solve = robot.standing(), _priorities.solve
+    used = iter(["active_set", "daqp", "daqp"])
+    monkeypatch.setattr(_priorities, "solve", lambda qp, solver: solve(qp, next(used)))
+    controller = fb.WholeBodyController(robot, judges.stance(robot), levels_of(robot, state))
+    assert controller(state.q, state.v).solution.solver == "active_set"

@@ -157,11 +157,11 @@ def test_legs_that_cannot_bend_are_reported():
 
 
 def test_a_biped_on_points_is_reported():
-    with warns(RobotWarning, "L_foot", "corners", 2):
+    with warns(RobotWarning, "L_foot", "corners", "R_foot"):
         fb.load_urdf(biped(""))
-    with warns(RobotWarning, "L_foot", "corners", 2):
+    with warns(RobotWarning, "L_foot", "corners", "R_foot"):
         fb.load_urdf(biped(BALLS), feet=["L_foot", "R_foot"], foot_radius=0.02)
-    with warns(RobotWarning, "L_foot", 2):  # a box without a size marks a place
+    with warns(RobotWarning, "L_foot", "R_foot"):  # a box without a size marks a place
         fb.load_urdf(biped('<collision><geometry><box size="0 0 0"/></geometry></collision>'))
 
 
@@ -175,7 +175,7 @@ def test_a_wheel_has_its_radius_and_its_axle_and_a_driven_ball_stays_a_ball(kind
     urdf = re.sub('(_foot_joint" type=)"revolute"', rf'\1"{kind}"', urdf).replace(
         '<axis xyz="1 0 0"/><limit lower="-1.5" upper="1.5"', '<axis xyz="0 1 0"/><limit'
     )
-    with warns(RobotWarning, 2):
+    with warns(RobotWarning, "L_foot"):
         robot = fb.load_urdf(urdf)
     for foot in robot.feet:
         assert foot.radius == pytest.approx(0.08, abs=1e-5)
@@ -218,3 +218,19 @@ def test_a_foot_answers_with_its_points():
     ball, sole = Foot("toe", 0.02, [0.0, 0.0, 0.1]), Foot("sole", corners=np.eye(3))
     assert ball.points.tolist() == [[0.0, 0.0, 0.1]] and not ball.is_flat
     assert sole.points.tolist() == np.eye(3).tolist() and sole.is_flat
+
+
+def test_a_ball_far_from_the_origin_of_its_link_has_a_frame_of_its_own_which_swings_move():
+    ball = BALLS.split("</collision>")[0] + "</collision>"
+    ball = ball.replace("0.12 0.03 -0.03", "0.1 0 -0.2").replace("0.005", "0.02")
+    robot = fb.load_urdf(biped(ball), posture={"*knee*": 0.5})
+    named = fb.load_urdf(
+        biped(ball), posture={"*knee*": 0.5}, feet=["L_foot", Foot("R_foot", 0.02, [0.1, 0, -0.2])]
+    )
+    assert [foot.frame for foot in robot.feet] == ["L_foot foot", "R_foot foot"]
+    assert [foot.frame for foot in named.feet] == [foot.frame for foot in robot.feet]
+    state = robot.standing()
+    for foot in robot.feet:
+        link = state.frame_pose(foot.frame.removesuffix(" foot"))
+        assert np.allclose(state.point(foot.frame), link.act(np.array([0.1, 0.0, -0.2])))
+        assert state.point(foot.frame)[2] == pytest.approx(0.02)

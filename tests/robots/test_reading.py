@@ -5,7 +5,7 @@ from dataclasses import replace
 import judges
 import numpy as np
 import pytest
-from messages import refused, warns
+from messages import raises, refused, warns
 
 import floatbase as fb
 from floatbase.errors import InputError, RobotWarning, SimulationError
@@ -190,3 +190,53 @@ def test_engines_that_differ_are_reported_with_the_links():
 def test_joints_without_effort_among_others_are_named():
     with warns(RobotWarning, "knee", "effort", "locked"):
         fb.load_urdf(PLAIN[::-1].replace('"9"=troffe', '"0"=troffe', 1)[::-1])
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "iso-8859-1", "utf-8-sig"])
+def test_a_file_is_read_in_its_encoding(tmp_path, encoding):
+    path = tmp_path / "one.urdf"
+    declaration = f'<?xml version="1.0" encoding="{encoding}"?>' if encoding[0] == "i" else ""
+    path.write_bytes((declaration + PLAIN.replace("foot", "Fuß")).encode(encoding))
+    assert "Fuß" in fb.load(path).frames
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "label"),
+    [
+        ('effort="9"', 'effort="-1"', "hip"),
+        ('velocity="9"', 'velocity="-1"', "hip"),
+        ("0 0 -1", "0 0 1e308", "hip"),
+        ('xyz="0 1 0"', 'xyz="0 1e-320 0"', "hip"),
+    ],
+)
+def test_numbers_that_no_robot_has_are_refused(old, new, label):
+    with raises(InputError, label):
+        fb.load_urdf(PLAIN.replace(old, new, 1))
+
+
+def test_an_effort_beyond_all_numbers_means_no_limit():
+    robot = fb.load_urdf(PLAIN.replace('effort="9"', 'effort="1.79769e+308"'))
+    assert np.isinf(robot.torque_limits).all()
+
+
+def test_a_chain_of_thousands_of_links_is_refused():
+    links = [link(f"l{i}") for i in range(5001)]
+    joints = [joint(f"j{i}", f"l{i}", f"l{i + 1}", "fixed", "") for i in range(5000)]
+    with raises(InputError, "5001"):
+        fb.load_urdf(f'<robot name="chain">{"".join(links + joints)}</robot>')
+
+
+def test_limits_in_degrees_are_reported():
+    with warns(RobotWarning, "robot", "radians"):
+        fb.load_urdf(PLAIN.replace('lower="-1" upper="1"', 'lower="-90" upper="90"'))
+
+
+@pytest.mark.parametrize(
+    ("ending", "text", "shown"),
+    [("urdf", "version https://git-lfs.github.com", "git-lfs"), ("xml", "<mujoco><a", "MJCF")],
+)
+def test_a_broken_file_is_described_by_what_it_is(tmp_path, ending, text, shown):
+    path = tmp_path / f"one.{ending}"
+    path.write_text(text)
+    with raises(InputError, shown):
+        fb.load(path)

@@ -11,6 +11,7 @@ from floatbase.behaviours.terrain import Plane
 from floatbase.behaviours.walk.options import flat_foot_names
 from floatbase.behaviours.walk.path import rotated_by_yaw
 from floatbase.dynamics import Contacts
+from floatbase.errors import InputError
 from floatbase.robots import State
 
 # fraction of its nominal distance from the middle that a foot keeps on its side: legs must not
@@ -31,7 +32,13 @@ class WalkingPosture:
         middle = [*np.mean(centres, axis=0), 0.0]
         self.nominal_feet = {name: position - middle for name, position in positions.items()}
         self.ground_height = float(contacts.positions(state)[:, 2].mean())
-        self.omega = sqrt(state.robot.gravity / (state.com[2] - self.ground_height))
+        height = state.com[2] - self.ground_height
+        if height <= 0.0:
+            raise InputError(
+                f"The centre of mass of {state.robot.name} is {-height:.3g} m below its feet. Turn "
+                f"the robot upright in its posture, or name other feet."
+            )
+        self.omega = sqrt(state.robot.gravity / height)
 
     def _centre_offset(self, foot: str) -> tuple[Array, Array]:
         """Return the centre of pressure relative to a foot's frame, in two parts of shape (2,) [m].

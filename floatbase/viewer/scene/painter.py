@@ -291,7 +291,8 @@ class Painter:
     @cached_property
     def patch_radius(self) -> float:
         """Radius of the contact patches [m]."""
-        return max([1.3 * foot.radius for foot in self.robot.feet] + [0.02 * self.size])
+        balls = [foot.radius for foot in self.robot.feet if foot.axis is None]
+        return max([1.3 * radius for radius in balls] + [0.02 * self.size])
 
     def _scale_bar(self, ground: DrawnGround) -> Picture:
         """Draw the scale bar; it is computed once for each ground."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import trimesh
 
 GREY = (0.62, 0.64, 0.67)
+SHARP = 0.5  # rad: edges with a larger angle between their faces are drawn as edges
 DARK = (0.2, 0.2, 0.2)  # colour of a material whose texture is missing
 
 
@@ -63,6 +64,8 @@ def _pieces(item: pin.GeometryObject) -> list[VisualMesh]:
         plain = trimesh.Trimesh(mesh.vertices, mesh.faces)
         plain.apply_scale(scale)
         plain.apply_transform(item.placement.homogeneous)
+        if not Path(item.meshPath).is_file():
+            plain = trimesh.graph.smooth_shade(plain, angle=SHARP)  # separate vertices at edges
         pieces.append(
             VisualMesh(int(item.parentJoint), _colour(item, mesh), plain, Path(item.meshPath).stem)
         )
