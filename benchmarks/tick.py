@@ -22,6 +22,13 @@ import floatbase as fb
 from floatbase.control import JointLimits, LinearInequality
 from floatbase.control.tick import tick
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint
+from floatbase.objectives import (
+    AngularMomentumTask,
+    AxisTask,
+    CentreOfPressureTask,
+    RelativePoseTask,
+    Task,
+)
 
 BACKENDS = ("compiled", "reference")
 JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
@@ -111,6 +118,43 @@ def own(n: int) -> Rows:
         for label in ("easy", "saturated"):
             times = interleaved(controllers, states(robot, n, SPREADS[label]), 3)
             yield [name, label, *microseconds(np.median(times, axis=1))]
+
+
+# tasks --------------------------------------------------------------------------------------------
+
+
+def added_tasks(robot: fb.Robot) -> list[Task]:
+    """Return one task of each class of the package."""
+    at, (first, *_, last) = robot.standing(), [foot.frame for foot in robot.feet]
+    pose = at.frame_pose(first).actInv(at.frame_pose(last))
+    return [
+        *fb.standing_tasks(at),
+        fb.FrameTask(first, at.point(first)),
+        AxisTask("base", [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
+        RelativePoseTask(last, first, pose),
+        AngularMomentumTask(),
+        CentreOfPressureTask([*at.com[:2], 0.0]),
+        fb.ForceTask(),
+        fb.TorqueTask(),
+    ]
+
+
+def one_more_task(n: int) -> Rows:
+    """Measure the control step with each task added to `standing_tasks`, relative to without."""
+    for name in ("go2", "g1", "talos"):
+        robot = fb.load(name)
+        feet, standing = fb.Contacts.feet(robot), fb.standing_tasks(robot.standing())
+        added = added_tasks(robot)
+        lists = [standing, *((*standing, task) for task in added)]
+        controllers = [fb.WholeBodyController(robot, feet, tasks) for tasks in lists]
+        times = np.median(interleaved(controllers, states(robot, n, SPREADS["easy"]), 3), axis=1)
+        for task, after in zip(added, times[1:], strict=True):
+            yield [
+                name,
+                type(task).__name__,
+                *microseconds([times[0], after]),
+                f"{after / times[0]:.2f}",
+            ]
 
 
 # joint limits -------------------------------------------------------------------------------------
@@ -228,6 +272,8 @@ def main() -> None:
             "inequalities | user-defined constraint | user-defined task, reference",
             own(few),
         ),
+        "Each task added to `standing_tasks` (median):",
+        harness.table("robot | task | without | with | ratio", one_more_task(few)),
         "Growth of the median control step (tick.png):",
         harness.table(
             "what | number | easy | saturated",

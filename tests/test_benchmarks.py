@@ -20,6 +20,17 @@ import peer_wire  # noqa: E402
 import peers  # noqa: E402
 import robots_tried  # noqa: E402
 import soak  # noqa: E402
+import tick  # noqa: E402
+
+import floatbase as fb  # noqa: E402
+from floatbase import objectives  # noqa: E402
+from floatbase.objectives._task import TargetTask  # noqa: E402
+
+
+def test_the_time_of_every_task_is_measured():
+    public = {getattr(objectives, name) for name in objectives.__all__}
+    tasks = {each for each in public if isinstance(each, type) and issubclass(each, TargetTask)}
+    assert tasks == {type(task) for task in tick.added_tasks(fb.load("go2"))}
 
 
 def test_the_friction_rows_are_those_of_the_peers():

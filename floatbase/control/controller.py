@@ -244,7 +244,11 @@ class WholeBodyController:
                 f"backend that supports the problem."
             )
         self._compiled = None if reason else compiled
-        self._backend_reason = reason or "it supports this problem" + cache_warning()
+        if self._compiled is not None:
+            names = ", ".join(self._compiled.user_terms.names)
+            reason = "it supports this problem" + cache_warning()
+            reason += f"; these terms run as Python beside it: {names}" if names else ""
+        self._backend_reason = reason
 
     def _with_problem(self, problem: Problem) -> WholeBodyController:
         """Return a controller of another problem with the same settings."""

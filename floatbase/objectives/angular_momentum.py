@@ -46,6 +46,7 @@ class AngularMomentumTask(TargetTask):
     name: str = "angular momentum"
     block: ClassVar[Block] = "qdd"
     target_shapes: ClassVar[Shapes] = {"momentum": (3,), "rate": (3,)}
+    compiled_as = "angular momentum"
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """Compute the residual A_k q̈ + Ȧ_k q̇ - (rate - kd (k_G - momentum)), with k_G = A_k q̇.

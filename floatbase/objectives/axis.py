@@ -81,6 +81,7 @@ class AxisTask(TargetTask):
         "angular_velocity": (3,),
         "angular_acceleration": (3,),
     }
+    compiled_as = "axis"
 
     def __post_init__(self) -> None:
         """Check the axis as well."""

@@ -77,6 +77,7 @@ class RelativePoseTask(MotionTask):
     kd: float | None = None
     weight: float = 10.0
     target_shapes: ClassVar[Shapes] = {"pose": (4, 4), "velocity": (6,), "acceleration": (6,)}
+    compiled_as = "relative pose"
 
     def __post_init__(self) -> None:
         """Check that the two frames differ."""

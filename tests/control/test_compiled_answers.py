@@ -15,6 +15,12 @@ from floatbase.control.tick import CompiledTick
 from floatbase.dynamics import CONSTRAINT_RANK_TOLERANCE
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
+from floatbase.objectives import (
+    AngularMomentumTask,
+    AxisTask,
+    CentreOfPressureTask,
+    RelativePoseTask,
+)
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
 from floatbase.robots import Robot, State
 
@@ -359,6 +365,49 @@ def test_a_command_keeps_its_numbers_when_the_state_moves_on():
     assert np.allclose(command.solution.qp.H, reference.qp(state).H)
 
 
+# tasks --------------------------------------------------------------------------------------------
+
+
+def moving_tasks(robot: Robot) -> dict[str, Any]:
+    """Return tasks with moving targets, on frames that move on their own and on fixed ones."""
+    foot, other = robot.feet[0].frame, robot.feet[-1].frame
+    pose, turned = np.eye(4), judges.rotation([0.3, -0.2, 0.5])
+    pose[:3, :3], pose[:3, 3] = turned, (0.1, 0.2, -0.3)
+    rates = np.linspace(-0.5, 1.0, 6)
+    return {
+        "relative": RelativePoseTask(foot, other, lambda t: (pose, t * rates, 2.0 * rates)),
+        "relative to the base": RelativePoseTask(other, "base", pose, weight=3.0, kd=7.0),
+        "axis": AxisTask(foot, [0.2, 0.3, 1.0], lambda t: ([t, 0.4, 2.0], rates[:3], rates[3:])),
+        "axis on target": AxisTask("base", [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
+        "momentum": AngularMomentumTask(lambda t: (t * rates[:3], rates[3:]), kd=3.0),
+    }
+
+
+@pytest.mark.parametrize("name", ["go2", "g1", "talos"])
+def test_tasks_on_axes_relative_poses_and_momentum_are_compiled(name):
+    robot = judges.load(name)
+    standing, added = fb.standing_tasks(robot.standing()), moving_tasks(robot)
+    bound = 0.1 * judges.agreement(robot)  # 1e-9 of the strongest motor's limit
+    for tasks in (*([task] for task in added.values()), added.values()):
+        both = judges.pair(robot, judges.stance(robot), [*standing, *tasks])
+        assert not both[0].compiled.user_terms.any
+        assert judges.largest_difference(both, judges.states(name, 3, 0.1), t=0.4) < bound
+
+
+def test_an_axis_opposite_to_its_direction_and_directions_of_any_length_have_answers():
+    robot, state = judges.load("go2"), judges.load("go2").standing()
+    axis = state.frame_pose("base").rotation.T @ [0.0, 0.0, 1.0]
+    tasks = [*fb.standing_tasks(state), AxisTask("base", axis, [0.0, 0.0, -1.0])]
+    both = judges.pair(robot, judges.stance(robot), tasks)
+    one, other = (each(state.q, state.v) for each in both)
+    assert np.allclose(one.tau, other.tau, rtol=0.0, atol=judges.agreement(robot))
+    targets, bound = both[0].targets_at(0.0), judges.agreement(robot)
+    for direction in ([0.0, 3.0, 4.0], [1e-3, 0.0, 1e-3]):
+        targets[both[0].targets["axis of base"]][:3] = direction
+        one, other = (each(state.q, state.v, 0.0, targets) for each in both)
+        assert np.allclose(one.tau, other.tau, rtol=0.0, atol=bound)
+
+
 # which backend runs -------------------------------------------------------------------------------
 
 
@@ -370,6 +419,13 @@ def test_the_backend_is_visible_and_can_be_chosen():
         assert controller.backend == controller(state.q, state.v).backend == backend
         assert backend in repr(controller)
         assert controller.backend_reason
+
+
+def test_the_reason_of_the_backend_names_what_runs_as_python():
+    robot = judges.load("go2")
+    tasks = [*fb.standing_tasks(robot.standing()), CentreOfPressureTask(np.zeros(3), name="mine")]
+    compiled = judges.pair(robot, judges.stance(robot), tasks)[0]
+    assert not missing(compiled.backend_reason, "Python", "mine")
 
 
 def test_another_solver_uses_the_reference_backend_and_the_reason_names_the_solver():

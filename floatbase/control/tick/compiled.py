@@ -17,7 +17,7 @@ from floatbase._validation import Array
 from floatbase.control.limits import force_rows, hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, modified_qp, residual_of
 from floatbase.control.tick.problem_arrays import HAS_CONES, Indices, pack_problem
-from floatbase.control.tick.targets import TargetLayout, task_kind
+from floatbase.control.tick.targets import TargetLayout, compiled_rows
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
@@ -133,7 +133,7 @@ class CompiledTick:
         self.unchecked_tasks = [
             task
             for i, task in enumerate(problem.tasks)
-            if i in time_varying or task_kind(task) is None
+            if i in time_varying or not compiled_rows(task)
         ]
         self.default_inputs = self.user_terms.zero_inputs(self.layout.constant)
         self._q_shape = (robot.nq,)

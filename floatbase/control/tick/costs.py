@@ -6,24 +6,48 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.dynamics import Bodies, centre_of_mass, point_velocity
+from floatbase.control.tick.dynamics import Bodies, angular_momentum, centre_of_mass, point_velocity
 from floatbase.control.tick.elimination import Parametrisation, add_entry, add_product
 from floatbase.control.tick.jit import jit
 from floatbase.control.tick.kinematics import body_jacobian, frame_pose
 from floatbase.control.tick.problem_arrays import FORCES, QDD, TAU
-from floatbase.control.tick.targets import COM, FORCE, FRAME, ORIENTATION, POSTURE, TORQUE
-from floatbase.control.tick.vectors import column_part, cross, dot, minus, plus, row_part, times
+from floatbase.control.tick.targets import (
+    ANGULAR_MOMENTUM,
+    AXIS,
+    COM,
+    FORCE,
+    FRAME,
+    ORIENTATION,
+    POSTURE,
+    TORQUE,
+)
+from floatbase.control.tick.vectors import (
+    column_part,
+    cross,
+    dot,
+    minus,
+    plus,
+    rotate,
+    row_part,
+    times,
+)
 from floatbase.control.tick.workspace import clear, take_matrix, take_vector
 
 _MAX_ROTATION_ERROR = 1e-9  # of entries of RᵀR: the reference backend corrects or refuses others
+_SMALL_SINE = 1e-9  # as in `AxisTask`
+_MIN_LENGTH = 1e-6  # of a direction: the reference backend decides about shorter ones
 
 
 class TaskTable(NamedTuple):
-    """N tasks."""
+    """N rows of tasks; most tasks have one."""
 
-    table: Any  # (N, 3), kind, joint, first number in targets
+    # (N, 7), kind, joint, joint of the reference, then indices in targets: from one row of the
+    # value to the next, of the value, of velocity and acceleration
+    table: Any
     gains: Any  # (N, 3), weight, kp, kd
-    frames: Any  # (N, 12), pose of the frame in the joint: rotation column by column, then position
+    # (2 N, 12), poses of the frame and of the reference in their joints: rotation column by column,
+    # then position. The x axis of the frame is the one of an axis task
+    frames: Any
     # of all tasks, one after another: position, rotation row by row or q, then velocity and
     # acceleration
     targets: Any
@@ -63,42 +87,96 @@ def is_rotation(x, y, z):
 
 
 @jit
-def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
-    """Return e, ė and J̇ v - desired acceleration of task i, and False if an angle is too large.
+def strided(numbers, first, stride):
+    """Return three numbers of an array, from index `first` on, one in `stride`."""
+    return numbers[first], numbers[first + stride], numbers[first + 2 * stride]
 
-    The task is on the CoM, an orientation or a frame. A target that is no rotation matrix also
-    gives False. rows: (3, nv), receives the Jacobian.
+
+@jit
+def across(n, x):
+    """Return x - n (n · x)."""
+    return minus(x, times(dot(n, x), n))
+
+
+@jit
+def direction_rates(n, omega, alpha):
+    """Return n × ṅ and n × n̈ of a direction with angular velocity ω and acceleration α."""
+    return across(n, omega), plus(across(n, alpha), times(dot(n, omega), cross(n, omega)))
+
+
+@jit
+def axis_error(n, d):
+    """Return e, the smallest rotation vector from d to n, and False if they are opposite."""
+    along, cosine = cross(d, n), dot(d, n)
+    sine = np.sqrt(dot(along, along))
+    scale = np.arctan2(sine, cosine) / sine if sine > _SMALL_SINE else 1.0
+    return times(scale, along), sine > _SMALL_SINE or cosine > 0.0
+
+
+@jit
+def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
+    """Return e, ė and J̇ v - desired acceleration of row i of the tasks, and whether it is valid.
+
+    Frames may be relative to a frame that moves; all vectors are in world axes nevertheless, which
+    does not change the cost. It is invalid if an angle is too large or if the target is no rotation
+    matrix or direction. rows: (3, nv), receives the Jacobian.
     """
     clear(rows)
-    kind, joint, first = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2]
-    targets = tasks.targets
-    target = targets.reshape(1, targets.size)
-    after, valid = first + (9 if kind == ORIENTATION else 3), True
-    if kind == COM:
+    kind, joint, reference = tasks.table[i, 0], tasks.table[i, 1], tasks.table[i, 2]
+    targets, stride, at = tasks.targets, tasks.table[i, 3], tasks.table[i, 4]
+    x, velocity = strided(targets, at, stride), strided(targets, tasks.table[i, 5], 1)
+    acceleration, e, valid = strided(targets, tasks.table[i, 6], 1), (0.0, 0.0, 0.0), True
+    if kind <= ANGULAR_MOMENTUM:
         p, e_dot, drift, mass = centre_of_mass(bodies)
-        e = minus(p, row_part(target, 0, first))
+        first, scale = 0, 1.0 / mass
+        if kind == COM:
+            e = minus(p, x)
+        else:
+            e_dot, drift = angular_momentum(bodies)
+            first, scale = 3, 1.0
         for r in range(3):
             for c in range(rows.shape[1]):
-                rows[r, c] = bodies.Ag[c, r] / mass
+                rows[r, c] = scale * bodies.Ag[c, first + r]
+        return e, minus(e_dot, velocity), minus(drift, acceleration), valid
+    R, p = frame_pose(bodies, joint, tasks.frames, 2 * i)
+    R_reference, origin = frame_pose(bodies, reference, tasks.frames, 2 * i + 1)
+    body_jacobian(bodies, joint, kind == FRAME, p, rows, 0)
+    body_jacobian(bodies, reference, kind == FRAME, p, rows, 0, -1.0)
+    omega = row_part(bodies.velocity, reference, 3)
+    if kind == FRAME:
+        e = minus(p, plus(origin, rotate(R_reference, x)))
+        (e_dot, drift), coriolis = point_velocity(bodies, joint, p), 2.0
+        reference_velocity, reference_drift = point_velocity(bodies, reference, p)
     else:
-        R, p = frame_pose(bodies, joint, tasks.frames, i)
-        if kind == ORIENTATION:
-            body_jacobian(bodies, joint, False, p, rows, 0)
-            e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
-            columns = targets[first:after].reshape(3, 3)
-            x, y, z = (
-                column_part(columns, 0, 0),
-                column_part(columns, 0, 1),
-                column_part(columns, 0, 2),
-            )
-            e, valid = rotation_error(R, (x, y, z))
-            valid = valid and is_rotation(x, y, z)
-        else:
-            body_jacobian(bodies, joint, True, p, rows, 0)
-            e_dot, drift = point_velocity(bodies, joint, p)
-            e = minus(p, row_part(target, 0, first))
-    e_dot = minus(e_dot, row_part(target, 0, after))
-    return e, e_dot, minus(drift, row_part(target, 0, after + 3)), valid
+        e_dot, drift, coriolis = (
+            row_part(bodies.velocity, joint, 3),
+            row_part(bodies.drift, joint, 3),
+            1.0,
+        )
+        reference_velocity, reference_drift = omega, row_part(bodies.drift, reference, 3)
+    if kind == ORIENTATION:
+        y, z = strided(targets, at + 1, stride), strided(targets, at + 2, stride)
+        target = rotate(R_reference, x), rotate(R_reference, y), rotate(R_reference, z)
+        e, valid = rotation_error(R, target)
+        valid = valid and is_rotation(x, y, z)
+    elif kind == AXIS:  # the first column of R
+        n, length = R[0], np.sqrt(dot(x, x))
+        direction = times(1.0 / length, x)
+        e, valid = axis_error(n, direction)
+        valid = valid and length > _MIN_LENGTH
+        e_dot, drift = direction_rates(n, e_dot, drift)
+        velocity, acceleration = direction_rates(direction, velocity, acceleration)
+        velocity, acceleration = across(n, velocity), across(n, acceleration)
+        for c in range(rows.shape[1]):
+            rows[0, c], rows[1, c], rows[2, c] = across(n, column_part(rows, 0, c))
+    e_dot = minus(e_dot, reference_velocity)
+    drift = minus(minus(drift, reference_drift), times(coriolis, cross(omega, e_dot)))
+    return (
+        e,
+        minus(e_dot, rotate(R_reference, velocity)),
+        minus(drift, rotate(R_reference, acceleration)),
+        valid,
+    )
 
 
 @jit
@@ -139,9 +217,9 @@ def task_costs(
     clear(weights)
     clear(weighted)
     for i in range(tasks.table.shape[0]):
-        kind, at = tasks.table[i, 0], tasks.table[i, 2]
+        kind, at = tasks.table[i, 0], tasks.table[i, 4]
         w, kp, kd = tasks.gains[i, 0], tasks.gains[i, 1], tasks.gains[i, 2]
-        if kind <= FRAME:
+        if kind <= AXIS:
             e, e_dot, bias, valid = motion_task(i, tasks, bodies, rows)
             if not valid:
                 return -1

@@ -234,6 +234,16 @@ def composite_bodies(model: Model, bodies: Bodies):
 
 
 @jit
+def angular_momentum(bodies: Bodies):
+    """Return the angular momentum about the centre of mass, and its drift."""
+    momentum, total = (0.0, 0.0, 0.0), bodies.carried
+    for c in range(bodies.v.size):
+        momentum = plus(momentum, times(bodies.v[c], row_part(bodies.Ag, c, 3)))
+    com = times(1.0 / total[0, MASS], row_part(total, 0, COM))
+    return momentum, minus(row_part(total, 0, RATE + 3), cross(com, row_part(total, 0, RATE)))
+
+
+@jit
 def centre_of_mass(bodies: Bodies):
     """Return position, velocity and drift of the centre of mass, and the mass."""
     mass, momentum = bodies.carried[0, MASS], (0.0, 0.0, 0.0)

@@ -47,8 +47,8 @@ def frame_pose(bodies: Bodies, joint, frames, i):
 
 
 @jit
-def body_jacobian(bodies: Bodies, joint, linear, p, out, row):
-    """Write the Jacobian of a joint's body into rows row:row + 3 of out (·, nv), which hold zeros.
+def body_jacobian(bodies: Bodies, joint, linear, p, out, row, factor=1.0):
+    """Add a multiple of the Jacobian of a joint's body to rows row:row + 3 of out (·, nv).
 
     linear: True for the velocity of the body's point p, world; False for its angular velocity.
     """
@@ -58,7 +58,8 @@ def body_jacobian(bodies: Bodies, joint, linear, p, out, row):
             J_c = row_part(bodies.J, c, 3)
             if linear:
                 J_c = plus(row_part(bodies.J, c, 0), cross(J_c, p))
-            out[row, c], out[row + 1, c], out[row + 2, c] = J_c
+            for r in range(3):
+                out[row + r, c] += factor * J_c[r]
         i = bodies.tree[i, 0]
 
 

@@ -20,6 +20,7 @@ from floatbase.control.problem import AssumedModel, Problem, assumed_model
 from floatbase.control.tick.targets import TargetLayout
 from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
 from floatbase.friction import FrictionPolyhedron
+from floatbase.objectives import AxisTask
 from floatbase.robots import Robot
 
 POINT, FLAT, USER_DEFINED = range(3)
@@ -27,8 +28,8 @@ CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
 QDD, TAU, FORCES = range(len(BLOCKS))
 _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
 # entries of `sizes`: numbers of joints, contacts, points, rows of eq. (5), rows of one cone
-# (its facets and the minimum normal force), built-in tasks, driven joints, entries of λ, targets,
-# numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
+# (its facets and the minimum normal force), rows of `TaskTable`, driven joints, entries of λ,
+# targets, numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
 N_JOINTS, N_CONTACTS, N_POINTS, N_MOTION_ROWS, N_CONE_ROWS, N_TASKS, N_DRIVEN = range(7)
 N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 12)
 # then 1 or 0: A and J are equal, `Inequalities.has_optional`, there are joint limits
@@ -82,7 +83,7 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         N_FORCES: problem.contacts.k,
         N_TARGETS: layout.size,
         N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:6]),
-        N_USER_TASKS: len(problem.tasks) - len(tasks),
+        N_USER_TASKS: len(problem.tasks) - len(layout.tasks),
         N_INEQUALITIES: n_inequalities,
         POINTS_ONLY: np.all(contacts[:, 1] == POINT) and not np.any(contacts[:, 6]),
         HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
@@ -175,20 +176,27 @@ def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:
 
 
 def _pack_tasks(problem: Problem, layout: TargetLayout) -> tuple[Any, ...]:
-    """Return tasks (N, 3), gains (N, 3) and frames (N, 12): the tables of `costs.TaskTable`.
+    """Return tasks (N, 7), gains (N, 3) and frames (2 N, 12): the tables of `costs.TaskTable`.
 
     Only the built-in tasks are included, so the positions of user-defined tasks in the list do not
     matter.
     """
-    n = len(layout.tasks)
-    table, gains, poses = np.zeros((n, 3), np.int64), np.zeros((n, 3)), np.zeros((n, _POSE_SIZE))
-    for i, (_, kind, task, _, entries) in enumerate(layout.tasks):
-        frame, joint = getattr(task, "frame", None), 0
-        if frame is not None:
-            joint, poses[i] = _frame_placement(problem.robot, frame)
-        table[i] = kind, joint, entries.start
-        gains[i] = task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)
-    return table, gains, poses
+    table, gains, poses = list[tuple[int, ...]](), list[tuple[float, ...]](), list[Array]()
+    for _, rows, task, _, entries in layout.tasks:
+        joint, pose = _frame_placement(problem.robot, getattr(task, "frame", "universe"))
+        reference, place = _frame_placement(problem.robot, getattr(task, "reference", "universe"))
+        if isinstance(task, AxisTask):
+            pose[:3] = pose[:9].reshape(3, 3).T @ np.asarray(task.axis)
+        for kind, value, stride, *derivatives in rows:
+            indices = [entries.start + index for index in (value, *derivatives)]
+            table.append((kind, joint, reference, stride, *indices))
+            gains.append((task.weight, getattr(task, "kp", 0.0), getattr(task, "kd", 0.0)))
+            poses += pose, place
+    return (
+        np.array(table, np.int64).reshape(-1, 7),
+        np.array(gains).reshape(-1, 3),
+        np.array(poses).reshape(-1, _POSE_SIZE),
+    )
 
 
 def _frame_placement(robot: Robot, name: str) -> tuple[int, Array]:

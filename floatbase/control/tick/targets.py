@@ -16,26 +16,35 @@ from floatbase.errors import InputError
 from floatbase.objectives import Task
 from floatbase.objectives._task import TargetTask
 
-COM, ORIENTATION, FRAME, POSTURE, FORCE, TORQUE = range(6)
-_TASK_KINDS = {
-    "com": COM, "orientation": ORIENTATION, "frame": FRAME, "posture": POSTURE, "force": FORCE,
-    "torque": TORQUE
-}  # fmt: skip
+COM, ANGULAR_MOMENTUM, ORIENTATION, FRAME, AXIS, POSTURE, FORCE, TORQUE = range(8)
+# kind, then indices in the task's targets: of the value, from one row of it to the next, of
+# velocity and acceleration. A pose in a reference is a position and an orientation in it.
+_TASK_ROWS: Mapping[str, tuple[tuple[int, ...], ...]] = {
+    "com": ((COM, 0, 1, 3, 6),),
+    "angular momentum": ((ANGULAR_MOMENTUM, 0, 0, 0, 3),),
+    "orientation": ((ORIENTATION, 0, 3, 9, 12),),
+    "frame": ((FRAME, 0, 1, 3, 6),),
+    "axis": ((AXIS, 0, 1, 3, 6),),
+    "relative pose": ((FRAME, 3, 4, 16, 22), (ORIENTATION, 0, 4, 19, 25)),
+    "posture": ((POSTURE, 0, 0, 0, 0),),
+    "force": ((FORCE, 0, 0, 0, 0),),
+    "torque": ((TORQUE, 0, 0, 0, 0),),
+}
 
 
-def task_kind(task: Task) -> int | None:
-    """Return the compiled form of a task, which its own class declares, or None.
+def compiled_rows(task: Task) -> tuple[tuple[int, ...], ...]:
+    """Return the compiled form of a task, which its own class declares, or ().
 
     The residual of a task without a compiled form is called.
     """
-    return _TASK_KINDS.get(vars(type(task)).get("compiled_as", ""))
+    return _TASK_ROWS.get(vars(type(task)).get("compiled_as", ""), ())
 
 
 class TaskTargets(NamedTuple):
     """The targets of one task."""
 
     task_index: int  # in the problem's tasks
-    kind: int  # COM, ORIENTATION, ...
+    rows: tuple[tuple[int, ...], ...]  # of `_TASK_ROWS`
     task: TargetTask
     shapes: Mapping[str, tuple[int, ...]]  # of the target and its derivatives, by field
     entries: slice  # in the array of all targets
@@ -50,11 +59,11 @@ class TargetLayout:
         self.tasks = list[TaskTargets]()
         robot, k = problem.robot, problem.contacts.k
         for i, task in enumerate(problem.tasks):
-            if (kind := task_kind(task)) is not None:
+            if rows := compiled_rows(task):
                 target_task = cast(TargetTask, task)
                 shapes = target_task.shapes_for(robot, k)
                 end = self.size + sum(prod(shape) for shape in shapes.values())
-                self.tasks.append(TaskTargets(i, kind, target_task, shapes, slice(self.size, end)))
+                self.tasks.append(TaskTargets(i, rows, target_task, shapes, slice(self.size, end)))
                 self.size = end
         # of several tasks with the same name, the first one
         self.names = MappingProxyType(

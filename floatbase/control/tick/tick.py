@@ -69,7 +69,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     ints[0], floats[0] = 0, 0
     tree = read_matrix(int_tables, ints, n, 6)
     contact_table = read_matrix(int_tables, ints, n_contacts, 7)
-    task_table = read_matrix(int_tables, ints, n_tasks, 3)
+    task_table = read_matrix(int_tables, ints, n_tasks, 7)
     terms = read_vector(float_tables, floats, N_TERMS)
     links = read_matrix(float_tables, floats, n, MASS + 1)
     joints = read_matrix(float_tables, floats, n, 15)
@@ -83,7 +83,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     gains = read_matrix(float_tables, floats, n_tasks, 3)
     user_tasks = user_start + sizes[size.N_CONTACT_NUMBERS]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, n_user_tasks, nv, k, d)
-    task_frames = read_matrix(float_tables, floats, n_tasks, 12)
+    task_frames = read_matrix(float_tables, floats, 2 * n_tasks, 12)
     tasks = TaskTable(task_table, gains, task_frames, inputs, user_tasks, n_user_tasks, n_user_rows)
     cones = read_matrix(float_tables, floats, n_points * n_rows, 5)
     torque_limits = read_vector(float_tables, floats, d)

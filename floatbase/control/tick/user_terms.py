@@ -14,7 +14,7 @@ from floatbase.affine import Affine
 from floatbase.control.limits import BLOCKS
 from floatbase.control.problem import Problem, residual_of
 from floatbase.control.tick.problem_arrays import CONTACT_KINDS
-from floatbase.control.tick.targets import task_kind
+from floatbase.control.tick.targets import compiled_rows
 from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -45,7 +45,7 @@ class UserTerms:
         self._tasks = [
             (i, task, BLOCKS.index(task.block))
             for i, task in enumerate(problem.tasks)
-            if task_kind(task) is None
+            if not compiled_rows(task)
         ]
         self._contacts = [
             contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS
@@ -53,6 +53,9 @@ class UserTerms:
         self._inequalities = self._limits.all_inequalities(problem.contacts)
         self.any = bool(self._tasks or self._contacts or self._inequalities)
         self.varies = self.any or self._limits.time_varying
+        self.names = [contact.name for contact in self._contacts]
+        self.names += [task.name for _, task, _ in self._tasks]
+        self.names += [each.name for each in self._inequalities]
         bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
         self._constant_bounds = (
             (bounds[0], bounds[1])
