@@ -28,6 +28,7 @@ example-robot-data are not listed. See [Your own robot](your_own_robot.md).
 
 from __future__ import annotations
 
+import textwrap
 import tomllib
 import warnings
 from collections import Counter
@@ -152,7 +153,8 @@ def attempt(path: str, arguments: dict[str, Any]) -> tuple[list[str], bool]:
 
 def short(message: object) -> str:
     """Return the first sentence of a message, on one line."""
-    return " ".join(str(message).split()).replace("|", "/").partition(". ")[0][:160]
+    sentence = str(message).replace("|", "/").partition(". ")[0]
+    return textwrap.shorten(sentence, 160, placeholder=" …")
 
 
 def row(title: str, end: str, path: str | None, needed: dict[str, Any]) -> list[str]:
