@@ -204,7 +204,7 @@ class Contacts(Value):
                 return Contacts.none()
             raise InputError(
                 f"{robot.name} has no feet. Name them when you load the robot, "
-                f'fb.load_urdf(path, feet=["…"]), or name the frames in contact, '
+                f'fb.load(path, feet=["…"]), or name the frames in contact, '
                 f'fb.Contacts.points(robot, frames=["…"]). For free flight, use fb.Contacts.none().'
             )
         feet = _selected_feet(robot, None, mu, normals)

@@ -204,7 +204,8 @@ def load_urdf(
         these are always searched.
     feet : sequence of str or Foot, optional
         Frames or `Foot` values that can touch the ground; by default the lowest ends of the limbs,
-        or none if the base is fixed.
+        or none if the base is fixed. A ball away from the origin of its link, as at the end of a
+        calf, is a foot of its own with a name such as "calf foot".
     foot_radius : float, optional
         Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
         the wheel that its collision shapes form, or a point if it has none.
