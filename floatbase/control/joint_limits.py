@@ -261,8 +261,8 @@ class JointLimits(Value):
             np.array([self.upper - q, q - self.lower]), np.array([v, -v])
         )
         least = -opposite
-        conflict = least > largest  # as in a locked joint
-        least[conflict] = largest[conflict] = 0.5 * (least[conflict] + largest[conflict])
+        if (conflict := least > largest).any():  # as in a locked joint
+            least[conflict] = largest[conflict] = 0.5 * (least[conflict] + largest[conflict])
         return least, largest, kinds
 
     def near(self, state: State, fraction: float) -> npt.NDArray[np.bool_]:
@@ -327,19 +327,18 @@ class JointLimits(Value):
         (2, d).
         """
         dt, (brake, most) = self.period, self.decelerations
-        stop = -v / dt  # at rest after one period
+        stop, step = v / -dt, v * dt  # at rest after one period; distance in one period
+        each = np.empty((len(_KINDS), *v.shape))
         with np.errstate(invalid="ignore", divide="ignore"):
             # the position after one period, or at the turning point if the joint turns before that
-            reach = 2.0 * (gap - v * dt) / dt**2
+            reach = 2.0 * (gap - step) / dt**2
             turns = (v > 0.0) & (gap > 0.0) & (reach <= stop)
             position = np.where(turns, np.minimum(stop, -(v**2) / (2.0 * gap)), reach)
-            # the position at which the joint stops if it brakes after one period
-            square = brake * (8.0 * gap - 4.0 * v * dt + brake * dt**2)
+            # the position at which the joint stops if it brakes after one period; NaN if it cannot
+            square = brake * (8.0 * gap - 4.0 * step + brake * dt**2)
             viable = (np.sqrt(square) - 2.0 * v - brake * dt) / (2.0 * dt)
-        viable = np.where(square >= 0.0, np.maximum(viable, stop), stop)
-        position = np.where(np.isfinite(gap), np.minimum(position, viable), np.inf)
-        acceleration = np.broadcast_to(self.acceleration, v.shape)
-        each = np.array([position, (self.speeds - v) / dt, acceleration])
+        each[0] = np.minimum(position, np.fmax(viable, stop))
+        each[1], each[2] = (self.speeds - v) / dt, self.acceleration
         return np.maximum(each.min(axis=0), -most), each.argmin(axis=0)
 
     def rows(self, state: State) -> tuple[Array, Array, tuple[ConstraintLabel, ...]]:
@@ -365,17 +364,20 @@ class JointLimits(Value):
         least, largest, kinds = self._bounds_and_kinds(q, v)
         upper, lower = self.bounded
         h = np.concatenate([largest[upper], -least[lower]])
-        labels = tuple(
-            _label(robot.joint_names[i], _KINDS[kinds[side, i]], ("upper", "lower")[side])
-            for side, i in np.argwhere(self.bounded).tolist()
-        )
-        return _selection(robot, self), h, labels
+        labels = _labels(robot, self)[np.arange(len(h)), kinds[self.bounded]]
+        return _selection(robot, self), h, tuple(labels)
 
 
-@lru_cache(maxsize=4096)
-def _label(joint: str, kind: str, side: str) -> ConstraintLabel:
-    """Return the name of a row."""
-    return ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
+@lru_cache(maxsize=64)
+def _labels(robot: Robot, limits: JointLimits) -> npt.NDArray[np.object_]:
+    """Return the names of the m rows for each kind of the strictest limit, shape (m, 3)."""
+    labels = [
+        ConstraintLabel(f"{joint} {kind} {side}", f"{side} {kind} limit", joint)
+        for side, is_bounded in zip(("upper", "lower"), limits.bounded, strict=True)
+        for joint in np.array(robot.joint_names)[is_bounded].tolist()
+        for kind in _KINDS
+    ]
+    return np.array(labels, dtype=np.object_).reshape(-1, len(_KINDS))
 
 
 def joint_positions(robot: Robot, q: Array) -> Array:

@@ -573,10 +573,13 @@ def force_bounds(contacts: Contacts, limits: Limits, least: Array, largest: Arra
     return np.concatenate([h.ravel(), largest[hard_maximum(contacts, limits)]])
 
 
+@lru_cache(maxsize=64)
 def hard_maximum(contacts: Contacts, limits: Limits) -> npt.NDArray[np.bool_]:
     """Return which contact points have a hard maximum of the normal force."""
     has_maximum: npt.NDArray[np.bool_] = limits.bounded_points(contacts)[1]
-    return has_maximum & (limits.normal_force_weight is None)
+    has_maximum &= limits.normal_force_weight is None
+    has_maximum.setflags(write=False)
+    return has_maximum
 
 
 @lru_cache(maxsize=64)

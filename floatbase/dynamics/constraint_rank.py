@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._validation import Array, Value, as_instance, read_only
+from floatbase._validation import Array, Value, as_instance, frozen, read_only
 from floatbase.dynamics.equations import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.linear_algebra import RANK_TOLERANCE
@@ -112,12 +112,12 @@ def resolved_constraint(eom: EquationsOfMotion) -> tuple[Array, Array]:
         Right-hand side [m/s², or rad/s² for angular rows].
     """
     U, s, Vt = _resolved(eom)
-    return read_only(U * s @ Vt), read_only(U @ (U.T @ eom.b))
+    return frozen(U * s @ Vt), frozen(U @ (U.T @ eom.b))
 
 
 def _resolved(eom: EquationsOfMotion) -> tuple[Array, Array, Array]:
     """Compute the singular value decomposition of A without the poorly resolved directions."""
     as_instance("eom", eom, EquationsOfMotion)
     U, s, Vt = np.linalg.svd(eom.A, full_matrices=False)
-    r = int(np.sum(s > CONSTRAINT_RANK_TOLERANCE * s.max(initial=0.0)))
+    r = int(np.count_nonzero(s > CONSTRAINT_RANK_TOLERANCE * s.max(initial=0.0)))
     return U[:, :r], s[:r], Vt[:r]

@@ -197,8 +197,8 @@ class RollingWheel(SinglePointContact):
         """
         return self.jacobian(state) @ state.v
 
-    def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return R c - r u and its derivative; u is the unit vector along n - (n · axle) axle."""
+    def _arm(self, state: State) -> tuple[Array, Array, Array]:
+        """Return R c - r u, its derivative, and ω; u is along n - (n · axle) axle."""
         R, omega = state.frame_pose(self.frame).rotation, state.frame_velocity(self.frame)[3:]
         n, axle, to_centre = self.normal, R @ self.axis, R @ self.centre
         axle_rate = cross(omega, axle)
@@ -211,7 +211,8 @@ class RollingWheel(SinglePointContact):
             )
         u, w_rate = w / length, -(n @ axle_rate) * axle - (n @ axle) * axle_rate
         u_rate = (w_rate - u * (u @ w_rate)) / length
-        return to_centre - self.radius * u, cross(omega, to_centre) - self.radius * u_rate
+        rate = cross(omega, to_centre) - self.radius * u_rate
+        return to_centre - self.radius * u, rate, omega
 
 
 def fixed_frame(frame: str) -> LinearConstraint:

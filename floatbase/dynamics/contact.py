@@ -16,6 +16,7 @@ from floatbase._validation import (
     as_string,
     checked,
     cross,
+    frozen,
     read_only,
     short_repr,
     unit_vector,
@@ -153,10 +154,9 @@ class SinglePointContact(Value):
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
         """Compute A = J and b = -J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm."""
-        arm, arm_rate = self._arm(state)
-        drift, omega = state.frame_drift(self.frame), state.frame_velocity(self.frame)[3:]
+        (arm, arm_rate, omega), drift = self._arm(state), state.frame_drift(self.frame)
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
-        return self._jacobian(state, arm), read_only(b)
+        return self._jacobian(state, arm), frozen(b)
 
     def rolling_velocity(self, state: State) -> Array:
         """Compute how fast the contact point moves along the body, as a ball or a wheel rolls.
@@ -171,18 +171,19 @@ class SinglePointContact(Value):
         ndarray, shape (3,)
             Velocity of the contact point minus that of the body there, in the world frame [m/s].
         """
-        arm, arm_rate = self._arm(state)
-        return arm_rate - cross(state.frame_velocity(self.frame)[3:], arm)
+        arm, arm_rate, omega = self._arm(state)
+        return arm_rate - cross(omega, arm)
 
     def _jacobian(self, state: State, arm: Array) -> Array:
         """Compute the Jacobian of the body point at `arm` from the frame's origin."""
         J = state.frame_jacobian(self.frame)
-        return read_only(J[:3] - pin.skew(arm) @ J[3:])
+        return frozen(J[:3] - pin.skew(arm) @ J[3:])
 
-    def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return the vector from the frame's origin to the contact point, and its derivative.
+    def _arm(self, state: State) -> tuple[Array, Array, Array]:
+        """Return the vector from the frame's origin to the contact point, its derivative, and ω.
 
-        Both have shape (3,) and are in world axes [m] and [m/s].
+        ω is the angular velocity of the body. All have shape (3,) and are in world axes [m], [m/s]
+        and [rad/s].
         """
         raise NotImplementedError
 
@@ -217,12 +218,11 @@ class PointContact(SinglePointContact):
     )
     jacobian_is_constraint: ClassVar[bool] = True
 
-    def _arm(self, state: State) -> tuple[Array, Array]:
-        """Return R c - r n and its derivative; the contact point stays below the centre."""
+    def _arm(self, state: State) -> tuple[Array, Array, Array]:
+        """Return R c - r n, its derivative, and ω; the contact point stays below the centre."""
         to_centre = state.frame_pose(self.frame).rotation @ self.centre
-        return to_centre - self.radius * self.normal, cross(
-            state.frame_velocity(self.frame)[3:], to_centre
-        )
+        omega = state.frame_velocity(self.frame)[3:]
+        return to_centre - self.radius * self.normal, cross(omega, to_centre), omega
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from floatbase._validation import (
     as_number,
     as_strings,
     cached_property,
+    frozen,
     numeric_copy,
     read_only,
     short_repr,
@@ -323,11 +324,11 @@ class Contacts(Value):
         t = as_number("t", t, "s")
         parts = [constraint_and_jacobian(contact, state, t) for contact in self.items]
         none = np.zeros((0, state.robot.nv))
-        A = read_only(np.vstack([none, *(A for A, _, _ in parts)]))
-        b = read_only(np.concatenate([np.zeros(0), *(b for _, b, _ in parts)]))
+        A = frozen(np.concatenate([none, *(A for A, _, _ in parts)]))
+        b = frozen(np.concatenate([np.zeros(0), *(b for _, b, _ in parts)]))
         if all(J is A for A, _, J in parts):
             return A, A, b
-        return read_only(np.vstack([none, *(J for _, _, J in parts)])), A, b
+        return frozen(np.concatenate([none, *(J for _, _, J in parts)])), A, b
 
     def force_slice(self, name: str) -> slice:
         """Return the slice of λ that belongs to one contact.

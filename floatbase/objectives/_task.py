@@ -27,6 +27,7 @@ from floatbase._validation import (
     as_number,
     as_positive,
     as_string,
+    cached_property,
     frozen,
     numeric_copy,
 )
@@ -171,8 +172,22 @@ class TargetTask(Value):
             for name, shape in self.target_shapes.items()
         }
 
+    @cached_property
+    def _constant_targets(self) -> dict[tuple[Robot, int], list[Array]]:
+        """Targets that do not depend on time, by the robot and the length of λ."""
+        return {}
+
     def targets_at(self, robot: Robot, k: int, t: float) -> list[Array]:
         """Return the targets at a time, in the order of `target_shapes`."""
+        if self.is_time_varying:
+            return self._checked_targets(robot, k, t)
+        known = self._constant_targets
+        if (robot, k) not in known:
+            known[robot, k] = self._checked_targets(robot, k, t)
+        return known[robot, k]
+
+    def _checked_targets(self, robot: Robot, k: int, t: float) -> list[Array]:
+        """Return the targets at a time after checking them."""
         shapes = self.shapes_for(robot, k)
         values = [getattr(self, name) for name in shapes]
         if self.is_time_varying:

@@ -48,7 +48,7 @@ class _BlockTask(TargetTask):
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """Compute the residual x - target."""
         (target,) = self._targets(eom, t)
-        return Affine.identity(target.size) - target
+        return Affine(Affine.identity(target.size).A, -target)
 
 
 @dataclass(frozen=True, eq=False)

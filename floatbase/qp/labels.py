@@ -52,9 +52,9 @@ class ConstraintLabel(str):
 
 def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[ConstraintLabel, ...]:
     """Return a label for each row of a matrix."""
-    given = names if isinstance(names, tuple) else ()
-    labels = tuple(name for name in given if isinstance(name, ConstraintLabel))
-    if not labels or len(labels) < len(given):  # not labels of another QP, which are checked
+    if isinstance(names, tuple) and set(map(type, names)) == {ConstraintLabel}:
+        labels = names  # of another QP, checked
+    else:
         labels = tuple(
             name if isinstance(name, ConstraintLabel) else ConstraintLabel(name)
             for name in as_strings(f"{kind}_names", names)

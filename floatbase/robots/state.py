@@ -263,7 +263,7 @@ class State(Value):
         J = pin.getFrameJacobian(
             self.robot.model, self._jacobians, self.robot.frame_id(frame), WORLD_ALIGNED
         )
-        return read_only(J.reshape(6, self.robot.nv))  # for one joint Pinocchio returns shape (6,)
+        return frozen(J).reshape(6, self.robot.nv)  # for one joint Pinocchio returns shape (6,)
 
     def frame_velocity(self, frame: str) -> Array:
         """Return the velocity of a frame's origin.
@@ -283,11 +283,10 @@ class State(Value):
         UnknownNameError
             If the robot has no such frame.
         """
-        return read_only(
-            pin.getFrameVelocity(
-                self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
-            ).vector
+        motion = pin.getFrameVelocity(
+            self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
         )
+        return frozen(motion.vector.copy())
 
     def frame_drift(self, frame: str) -> Array:
         """Return the drift J̇ v of a frame, which is the acceleration of its origin if q̈ = 0.
@@ -310,7 +309,7 @@ class State(Value):
         motion = pin.getFrameClassicalAcceleration(
             self.robot.model, self._data, self.robot.frame_id(frame), WORLD_ALIGNED
         )
-        return read_only(motion.vector)
+        return frozen(motion.vector.copy())
 
     def integrate(self, dv: npt.ArrayLike) -> Array:
         """Return the configuration after a displacement.
