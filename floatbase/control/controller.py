@@ -213,7 +213,7 @@ class WholeBodyController:
             if problem.level_sizes:
                 problem.check()  # the QP of a level needs solutions
             else:
-                problem.qp(robot.standing())
+                problem.qp(robot.standing(), slacks=False)
         check_solver(solver)
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)
@@ -369,7 +369,7 @@ class WholeBodyController:
         """
         return self._layout.at(as_number("t", t, "s"))
 
-    def qp(self, state: State, t: float = 0.0) -> QP:
+    def qp(self, state: State, t: float = 0.0, *, slacks: bool = True) -> QP:
         """Return the QP of one control step, for inspection.
 
         Parameters
@@ -378,16 +378,16 @@ class WholeBodyController:
             State of the robot.
         t : float, optional
             Time [s].
+        slacks : bool, optional
+            Whether soft inequalities, such as joint limits by default, have slack variables, as in
+            `Problem.qp`.
 
         Returns
         -------
         QP
-            The QP in x = (q̈, τ, λ); with priority levels, that of the last level. Soft
-            inequalities have a finite entry in its `penalties`. To solve it with another solver,
-            pass `qp.with_slacks()` to that solver: H, g, A, b, G and h alone are a problem in which
-            all inequalities are hard.
+            The QP in x = (q̈, τ, λ, slacks); with priority levels, that of the last level.
         """
-        return self._problem.qp(state, t)
+        return self._problem.qp(state, t, slacks=slacks)
 
     def __call__(
         self,

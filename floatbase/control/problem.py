@@ -20,6 +20,7 @@ from floatbase._validation import (
     as_integer,
     as_positive,
     checked,
+    frozen,
     short_repr,
 )
 from floatbase.affine import Affine
@@ -146,7 +147,7 @@ class Problem(Value):
         tasks = iter(self.tasks)
         return tuple(tuple(islice(tasks, size)) for size in self.level_sizes)
 
-    def qp(self, state: State, t: float = 0.0) -> QP:
+    def qp(self, state: State, t: float = 0.0, *, slacks: bool = True) -> QP:
         """Return the QP at a state and a time.
 
         Parameters
@@ -155,14 +156,16 @@ class Problem(Value):
             State of the robot.
         t : float, optional
             Time [s].
+        slacks : bool, optional
+            Whether soft inequalities, such as joint limits by default, have slack variables, so
+            that any QP solver can solve the problem. False gives the smaller problem in which
+            `penalties` marks them. Only solvers of this package know `penalties`.
 
         Returns
         -------
         QP
-            The QP in x = (q̈, τ, λ). With priority levels it is the QP of the last level, with the
-            optima of the other levels as equality constraints. Soft inequalities, such as joint
-            limits by default, have a finite entry in its `penalties`. To solve it with another
-            solver, pass `qp.with_slacks()` to that solver.
+            The QP in x = (q̈, τ, λ, slacks). With priority levels it is the QP of the last level,
+            with the optima of the other levels as equality constraints.
 
         Raises
         ------
@@ -175,10 +178,12 @@ class Problem(Value):
             levels has no solution.
         """
         if self.level_sizes:
-            return self.solve_levels(state, t)[-1].qp
-        self._check_robot(state)
-        eom = equations_of_motion(state, self.contacts, t)
-        return modified_qp(self, build_qp(eom, self.tasks, self.limits, t), eom)
+            qp = self.solve_levels(state, t)[-1].qp
+        else:
+            self._check_robot(state)
+            eom = equations_of_motion(state, self.contacts, t)
+            qp = modified_qp(self, build_qp(eom, self.tasks, self.limits, t, slacks=False), eom)
+        return qp.with_slacks() if slacks else qp
 
     @one_blas_thread()
     def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
@@ -207,7 +212,7 @@ class Problem(Value):
             If there is no solution.
         """
         if not self.level_sizes:
-            return [solve(self.qp(state, t), solver)]
+            return [solve(self.qp(state, t, slacks=False), solver)]
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
         levels = self.levels
@@ -221,7 +226,7 @@ class Problem(Value):
         qps = [first]
         for terms in costs[1:]:
             H, g = _objective(terms, first.blocks, first.n)
-            qps.append(changed(first, H=H, g=g))
+            qps.append(changed(first, H=0.5 * (H + H.T), g=g))
         return solve_levels(qps, levels, costs, solver)
 
     def _check_robot(self, state: State) -> None:
@@ -256,8 +261,15 @@ class Problem(Value):
                 inequality.labels(len(inequality.at(eom)[0]))
 
 
-def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: float = 0.0) -> QP:
-    """Assemble the whole-body QP in x = (q̈, τ, λ) at a state.
+def build_qp(
+    eom: EquationsOfMotion,
+    tasks: Sequence[Task],
+    limits: Limits,
+    t: float = 0.0,
+    *,
+    slacks: bool = True,
+) -> QP:
+    """Assemble the whole-body QP at a state.
 
     The objective is the sum of (weight / 2) ‖residual‖² of the tasks. The equality constraints are
     the equations of motion (7). The inequality constraints are those of `limits`.
@@ -273,12 +285,13 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         Inequality constraints.
     t : float, optional
         Time at which time-varying targets, bounds and inequalities are evaluated [s].
+    slacks : bool, optional
+        Whether soft inequalities have slack variables, as in `Problem.qp`.
 
     Returns
     -------
     QP
-        The QP in x = (q̈, τ, λ). Soft inequalities have a finite entry in its `penalties`. To solve
-        it with another solver, pass `qp.with_slacks()` to that solver.
+        The QP in x = (q̈, τ, λ, slacks).
 
     Raises
     ------
@@ -307,7 +320,9 @@ def build_qp(eom: EquationsOfMotion, tasks: Sequence[Task], limits: Limits, t: f
         )
     costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
     inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
-    return assemble_qp(eom, costs, limits, limits.hard_normal_forces(eom.contacts, t), inequalities)
+    normal_forces = limits.hard_normal_forces(eom.contacts, t)
+    qp = assemble_qp(eom, costs, limits, normal_forces, inequalities)
+    return qp.with_slacks() if slacks else qp
 
 
 def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
@@ -350,42 +365,42 @@ def assemble_qp(
     A[nv:, :nv] = motion
     G_force, names = force_rows(eom.contacts, limits)
     G_torque, h_torque, torque_names = torque_rows(eom.robot, limits)
-    blocks_of_G: list[tuple[Block, Array, Array]] = [
-        ("forces", G_force, force_bounds(eom.contacts, limits, *normal_forces)),
-        ("tau", G_torque, h_torque),
+    parts: list[tuple[Block, float | None, Array, Array]] = [
+        ("forces", None, G_force, force_bounds(eom.contacts, limits, *normal_forces)),
+        ("tau", None, G_torque, h_torque),
     ]
     names += torque_names
-    weights: list[float | None] = [None] * len(names)
     if limits.joint_limits is not None:
         G_joint, h_joint, joint_names = limits.joint_limits.rows(eom.state)
-        blocks_of_G.append(("qdd", G_joint, h_joint))
+        parts.append(("qdd", limits.joint_limits.weight, G_joint, h_joint))
         names += joint_names
-        weights += [limits.joint_limits.weight] * len(h_joint)
     user_defined = limits.all_inequalities(eom.contacts)
     for inequality, (G_user, h_user) in zip(user_defined, inequalities, strict=True):
-        blocks_of_G.append((inequality.block, G_user, h_user))
+        parts.append((inequality.block, inequality.weight, G_user, h_user))
         names += inequality.labels(len(G_user))
-        weights += [inequality.weight] * len(h_user)
-    G = np.zeros((len(names), n))
-    h = np.concatenate([part[2] for part in blocks_of_G])
-    row = 0
-    for each, G_part, _ in blocks_of_G:
-        G[row : row + len(G_part), blocks[each]] = G_part
-        row += len(G_part)
-    penalties = np.array([np.inf if weight is None else weight for weight in weights])
+    G, penalties, row = np.zeros((len(names), n)), np.full(len(names), np.inf), 0
+    for block, weight, G_part, _ in parts:
+        rows = slice(row, row + len(G_part))
+        G[rows, blocks[block]] = G_part
+        penalties[rows] = np.inf if weight is None else weight
+        row = rows.stop
+    h = np.concatenate([part[3] for part in parts])
     b, equality_names = np.concatenate([-eom.h, b]), _equality_names(eom.robot, eom.contacts)
-    soft = penalties if any(weights) else None
+    soft = penalties if np.isfinite(penalties).any() else None
+    for array in (H, g, A, b, G, h):
+        frozen(array)  # `QP` copies others
     return QP(H, g, A, b, G, h, equality_names, names, blocks, soft)
 
 
 def _objective(costs: Costs, blocks: Mapping[str, slice], n: int) -> tuple[Array, Array]:
-    """Return H and g of the sum of (weight / 2) ‖residual‖² in n variables."""
+    """Return H, up to rounding symmetric, and g of the sum of (weight / 2) ‖residual‖²."""
     H, g = np.zeros((n, n)), np.zeros(n)
-    for each, weight, residual in costs:
-        block, weighted = blocks[each], weight * residual.A.T
-        H[block, block] += weighted @ residual.A
-        g[block] += weighted @ residual.b
-    return 0.5 * (H + H.T), g
+    parts = {block: (H[entries, entries], g[entries]) for block, entries in blocks.items()}
+    for block, weight, (A, b) in costs:
+        (H_block, g_block), weighted = parts[block], weight * A.T
+        H_block += weighted @ A
+        g_block += weighted @ b
+    return H, g
 
 
 @contextmanager
@@ -480,8 +495,8 @@ def _resolved_motion_rows(eom: EquationsOfMotion) -> tuple[Array, Array]:
     """
     A, b = resolved_constraint(eom)
     gap = np.abs(eom.b - b)
-    velocity = float(np.max(np.abs(eom.A @ eom.state.v), initial=0.0))
-    if np.max(gap, initial=0.0) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * velocity:
+    velocity = np.abs(eom.A @ eom.state.v).max(initial=0.0)
+    if gap.max(initial=0.0) > INCONSISTENCY_TOLERANCE + CONSTRAINT_NOISE * velocity:
         rows = _equality_names(eom.robot, eom.contacts)[eom.nv :]
         names = [rows[i] for i in np.flatnonzero(gap > 0.1 * gap.max())]
         raise InfeasibleError(

@@ -52,7 +52,7 @@ from floatbase._validation import (
     read_only,
 )
 from floatbase.affine import Affine
-from floatbase.errors import SolverError, unknown_name
+from floatbase.errors import InputError, SolverError, unknown_name
 from floatbase.linear_algebra import RANK_TOLERANCE, null_space
 from floatbase.qp.conflicts import (
     MULTIPLIER_TOLERANCE,
@@ -177,15 +177,18 @@ def active_set(
     UnknownNameError
         If `working_set` contains an unknown row.
     InputError
-        If `start` has the wrong shape, or if `max_iterations` is less than 1.
+        If `start` has the wrong shape, if `max_iterations` is less than 1, or if inequalities are
+        soft without slack variables.
 
     Notes
     -----
     [FBR]_, App. C. [NocedalWright2006]_
-
-    Soft inequalities are treated as hard. To let them be violated, pass `qp.with_slacks()`.
     """
-    qp = replace(as_instance("qp", qp, QP), penalties=None)
+    if len(as_instance("qp", qp, QP).soft):
+        raise InputError(
+            f"{len(qp.soft)} inequalities of the QP are soft, but active_set treats all as hard. "
+            f"Pass qp.with_slacks(), or dataclasses.replace(qp, penalties=None) to make them hard."
+        )
     space, problem = qp.equality_space, qp.reduced
     rows = _independent_rows(
         problem, [_index(qp, name) for name in as_strings("working_set", working_set)]

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -38,6 +39,7 @@ from floatbase._validation import (
     as_array,
     as_strings,
     cached_property,
+    frozen,
     numeric_copy,
     read_only,
     short_repr,
@@ -81,7 +83,8 @@ class QP(Value):
         Names of slices of x.
     penalties : array_like, shape (l,), optional
         Weight w of the violation of each inequality in the objective; inf for a hard constraint. By
-        default all inequalities are hard [units of the objective per unit of h].
+        default all inequalities are hard [units of the objective per unit of h]. Only solvers of
+        this package know weights; `with_slacks` prepares the problem for others.
 
     Raises
     ------
@@ -109,7 +112,7 @@ class QP(Value):
         g = as_array("g", self.g, (None,))
         A, G = as_array("A", self.A, (None, g.size)), as_array("G", self.G, (None, g.size))
         H = as_array("H", self.H, (g.size, g.size))
-        values: dict[str, object] = {"H": read_only(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
+        values: dict[str, object] = {"H": frozen(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
         values["b"], values["h"] = (
             as_array("b", self.b, (len(A),)),
             as_array("h", self.h, (len(G),)),
@@ -183,39 +186,35 @@ class QP(Value):
         Returns
         -------
         QP
-            Problem whose variables are x and, in the block "violations", the violations of the soft
+            Problem whose variables are x and, in the block "slacks", the violations of the soft
             inequalities.
 
         Raises
         ------
         InputError
-            If a block of the problem is named "violations".
+            If a block of the problem is named "slacks".
         """
         n, s, soft = self.n, len(self.soft), self.soft
         if not s:
             return self
-        if "violations" in self.blocks:
-            raise InputError('A problem with soft inequalities needs a free name "violations".')
+        if "slacks" in self.blocks:
+            raise InputError('A problem with soft inequalities needs a free name "slacks".')
         assert self.penalties is not None
-        H, G = np.zeros((n + s, n + s)), np.zeros((len(self.G) + s, n + s))
-        H[:n, :n], G[: len(self.G), :n] = self.H, self.G
-        G[soft, n + np.arange(s)] = -1.0
-        G[len(self.G) :, n:] = -np.eye(s)
-        names = [
-            ConstraintLabel(f"violation of {self.inequality_names[i]} ≥ 0", "violation")
-            for i in soft
-        ]
-        return QP(
-            H,
-            np.append(self.g, self.penalties[soft]),
-            np.hstack([self.A, np.zeros((len(self.A), s))]),
-            self.b,
-            G,
-            np.append(self.h, np.zeros(s)),
-            self.equality_names,
-            (*self.inequality_names, *names),
-            {**self.blocks, "violations": slice(n, n + s)},
-        )
+        m, rows = len(self.A), len(self.G)
+        H, A, G = np.zeros((n + s, n + s)), np.zeros((m, n + s)), np.zeros((rows + s, n + s))
+        H[:n, :n], A[:, :n], G[:rows, :n] = self.H, self.A, self.G
+        slacks = np.arange(s)
+        G[soft, n + slacks] = G[rows + slacks, n + slacks] = -1.0
+        names = [_slack_label(self.inequality_names[i]) for i in soft.tolist()]
+        return QP._unchecked(
+            H=frozen(H), g=frozen(np.concatenate([self.g, self.penalties[soft]])),
+            A=frozen(A), b=self.b, G=frozen(G), h=frozen(np.concatenate([self.h, np.zeros(s)])),
+            equality_names=self.equality_names,
+            inequality_names=constraint_labels(
+                (*self.inequality_names, *names), rows + s, "inequality"
+            ),
+            blocks=as_blocks({**self.blocks, "slacks": slice(n, n + s)}), penalties=None,
+        )  # fmt: skip
 
     @property
     def n(self) -> int:
@@ -299,7 +298,9 @@ class QP(Value):
         return read_only(row_norms(self.G))
 
     def __repr__(self) -> str:
-        return f"QP({self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities)"
+        soft = f", {len(self.soft)} of them soft" if len(self.soft) else ""
+        sizes = f"{self.n} variables, {len(self.A)} equalities, {len(self.G)} inequalities"
+        return f"QP({sizes}{soft})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -313,10 +314,16 @@ class InequalityQP(QP):
         object.__setattr__(self, "row_norms", as_array("row_norms", self.row_norms, (len(self.G),)))
 
 
+@lru_cache(maxsize=4096)
+def _slack_label(inequality: str) -> ConstraintLabel:
+    """Return the name of the row s ≥ 0 of the slack of an inequality."""
+    return ConstraintLabel(f"slack of {inequality} ≥ 0", "slack", inequality)
+
+
 def _as_penalties(penalties: npt.ArrayLike, count: int) -> Array:
     """Return penalties, shape (count,), after checking that all are positive or inf."""
     weights = numeric_copy(penalties)
-    if weights is None or weights.shape != (count,) or not np.all(weights > 0.0):
+    if weights is None or weights.shape != (count,) or not (weights > 0.0).all():
         raise InputError(
             f"penalties must be {count} positive numbers, one for each inequality, or inf for "
             f"hard constraints, not {short_repr(penalties)}."

@@ -249,7 +249,7 @@ class Viewer(Controls, Output):
         contacts : Contacts
             The contacts that the controller was given.
         solution : Solution
-            The controller's solution: `command.solution`, or that of `solve(controller.qp(state))`.
+            The controller's solution, `command.solution`.
 
         Returns
         -------

@@ -11,7 +11,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
-from floatbase.control import JointLimits, Limits, LinearInequality
+from floatbase.control import JointLimits, Limits, LinearInequality, build_qp
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.qp import QP
 from floatbase.robots import Robot, State
@@ -276,7 +276,7 @@ def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind():
         assert judges.difference(*both, state) < 1e-6 * robot.torque_limits.max()
 
 
-def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_problem_with_slacks():
+def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_arrays_of_the_problem():
     cp = pytest.importorskip("cvxpy")
     robot = judges.load("go2")
     state, limits = robot.standing(), JointLimits.of(robot)
@@ -293,9 +293,16 @@ def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_problem_w
         problem.solve("CLARABEL", **accuracy)
         return x.value[qp.blocks["tau"]]
 
-    qp, command = controller.qp(state), controller(state.q, state.v)
-    assert np.allclose(torques(qp.with_slacks()), command.tau, rtol=0.0, atol=0.1)
-    assert command.violations and np.max(np.abs(torques(qp) - command.tau)) > 10.0
+    command, problem = controller(state.q, state.v), controller.problem
+    eom = fb.equations_of_motion(state, controller.contacts)
+    built = build_qp(eom, controller.tasks, controller.limits)
+    for qp in (controller.qp(state), problem.qp(state), built, command.solution.qp.with_slacks()):
+        assert np.allclose(torques(qp), command.tau, rtol=0.0, atol=0.1)
+    hard = controller.qp(state, slacks=False)
+    assert command.violations and np.max(np.abs(torques(hard) - command.tau)) > 10.0
+    levels = controller.replace(tasks=[controller.tasks[:1], controller.tasks[1:]])
+    expected = levels(state.q, state.v).tau
+    assert np.allclose(torques(levels.qp(state)), expected, rtol=0.0, atol=0.1)
 
 
 def test_joint_limits_that_do_not_fit_are_refused():

@@ -152,7 +152,7 @@ def check_levels(state: State, controller: fb.WholeBodyController) -> bool:
     """Check that no level can be improved; return whether there is a solution."""
     problem = controller.problem
     eom = fb.equations_of_motion(state, controller.contacts)
-    qp = build_qp(eom, problem.tasks, problem.limits)
+    qp = build_qp(eom, problem.tasks, problem.limits, slacks=False)
     G, h = qp.G / qp.row_norms[:, None], qp.h / qp.row_norms
     most = np.full(len(h), np.inf) if qp.penalties is None else qp.penalties * qp.row_norms
     try:

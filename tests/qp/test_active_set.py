@@ -1,5 +1,6 @@
 """The active-set solver: right answers, a true record of the iterations, termination."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import judges
@@ -167,7 +168,8 @@ def controller_qps(name, n, torque, mu=0.5):
         torque_limits=limits,
         backend="reference",
     )
-    return [controller.qp(robot.random_state(seed, (0.05, 0.15)[seed % 2])) for seed in range(n)]
+    states = [robot.random_state(seed, (0.05, 0.15)[seed % 2]) for seed in range(n)]
+    return [replace(controller.qp(state, slacks=False), penalties=None) for state in states]
 
 
 @pytest.mark.parametrize("name", judges.KINDS)
@@ -205,7 +207,7 @@ def swaying_qps(name, ticks, dt=0.002):
     controller = fb.WholeBodyController(robot, contacts, tasks, **options)
     qps = []
     for tick in range(ticks):
-        qps.append(controller.qp(state, 0.2 + tick * dt))
+        qps.append(replace(controller.qp(state, 0.2 + tick * dt, slacks=False), penalties=None))
         v = state.v + dt * solve(qps[-1])["qdd"]
         state = state.replace(pin.integrate(robot.model, state.q, dt * v), v)
     return qps

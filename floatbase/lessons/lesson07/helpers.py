@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from statistics import median
 from typing import Any
@@ -57,12 +58,10 @@ class WithConstraints(SolverController):
 
     def qp(self, state: fb.State, t: float = 0.0) -> fb.QP:
         """Return the QP of one control step."""
-        qp = super().qp(state, t)
+        qp = self.controller.qp(state, t, slacks=False)
         costs = self.costs.objective(fb.equations_of_motion(state, self.costs.contacts))
         H, g = block_diag(*(cost.H for cost in costs)), np.concatenate([cost.g for cost in costs])
-        return fb.QP(
-            H, g, qp.A, qp.b, qp.G, qp.h, qp.equality_names, qp.inequality_names, qp.blocks
-        )
+        return replace(qp, H=H, g=g)
 
 
 def run_with_push(
