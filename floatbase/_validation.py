@@ -308,7 +308,7 @@ def as_array(name: str, value: Any, shape: tuple[int | None, ...], unit: str = "
             f"{name} {place} a finite "
             f"number{f' of magnitude at most {MAX_MAGNITUDE:g}' if np.isfinite(array[at]) else ''}."
         )
-    return frozen(array)
+    return array if array is value else frozen(array)
 
 
 def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:

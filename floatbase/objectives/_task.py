@@ -179,9 +179,7 @@ class TargetTask(Value):
 
     def targets_at(self, robot: Robot, k: int, t: float) -> list[Array]:
         """Return the targets at a time, in the order of `target_shapes`."""
-        if self.is_time_varying:
-            return self._checked_targets(robot, k, t)
-        known = self._constant_targets
+        known = {} if self.is_time_varying else self._constant_targets
         if (robot, k) not in known:
             known[robot, k] = self._checked_targets(robot, k, t)
         return known[robot, k]

@@ -112,27 +112,21 @@ class QP(Value):
         g = as_array("g", self.g, (None,))
         A, G = as_array("A", self.A, (None, g.size)), as_array("G", self.G, (None, g.size))
         H = as_array("H", self.H, (g.size, g.size))
-        values: dict[str, object] = {"H": frozen(0.5 * (H + H.T)), "g": g, "A": A, "G": G}
-        values["b"], values["h"] = (
-            as_array("b", self.b, (len(A),)),
-            as_array("h", self.h, (len(G),)),
-        )
-        values["blocks"] = as_blocks(self.blocks)
-        values["equality_names"] = constraint_labels(self.equality_names, len(A), "equality")
-        values["inequality_names"] = constraint_labels(self.inequality_names, len(G), "inequality")
-        if self.penalties is not None:
-            values["penalties"] = _as_penalties(self.penalties, len(G))
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        vars(self).update(
+            H=frozen(0.5 * (H + H.T)), g=g, A=A, G=G,
+            b=as_array("b", self.b, (len(A),)), h=as_array("h", self.h, (len(G),)),
+            blocks=as_blocks(self.blocks),
+            equality_names=constraint_labels(self.equality_names, len(A), "equality"),
+            inequality_names=constraint_labels(self.inequality_names, len(G), "inequality"),
+            penalties=None if self.penalties is None else _as_penalties(self.penalties, len(G)),
+        )  # fmt: skip
 
     @classmethod
     def _unchecked(cls, **values: Any) -> Self:
         """Make a problem from values that are known to fit, without checking them again."""
         qp = object.__new__(cls)
-        for name, value in values.items():
-            object.__setattr__(
-                qp, name, read_only(value) if isinstance(value, np.ndarray) else value
-            )
+        arrays = {k: read_only(v) for k, v in values.items() if isinstance(v, np.ndarray)}
+        vars(qp).update(values | arrays)
         return qp
 
     def without(self, *kinds: str) -> QP:
@@ -160,17 +154,10 @@ class QP(Value):
                 raise unknown_name("kind of constraint", kind, known)
         kept = [i for i, label in enumerate(labels) if label.kind not in kinds]
         names = tuple(labels[i] for i in kept)
+        G, h = self.G[kept], self.h[kept]
+        penalties = None if self.penalties is None else self.penalties[kept]
         return QP(
-            self.H,
-            self.g,
-            self.A,
-            self.b,
-            self.G[kept],
-            self.h[kept],
-            self.equality_names,
-            names,
-            self.blocks,
-            None if self.penalties is None else self.penalties[kept],
+            self.H, self.g, self.A, self.b, G, h, self.equality_names, names, self.blocks, penalties
         )
 
     @cached_property
