@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 from functools import cache
+from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple, get_origin
@@ -127,19 +128,6 @@ def imports(path):
     return [one for one in found if one.module.split(".")[0] == "floatbase"]
 
 
-def circles(graph):
-    """Sets of files that import one another, directly or not."""
-    reachable = {node: set(targets) for node, targets in graph.items()}
-    for middle in graph:  # Warshall's algorithm
-        for found in reachable.values():
-            if middle in found:
-                found |= reachable[middle]
-    rings = {
-        frozenset(other for other in reachable[node] if node in reachable[other]) for node in graph
-    }
-    return [set(ring) for ring in rings if ring]
-
-
 def test_every_module_has_a_layer():
     assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in LAYERED} <= set(
         LAYER_OF
@@ -217,15 +205,15 @@ def top_folder(path):
 
 
 def test_only_robot_state_and_standing_import_one_another():
+    """The order of the other modules has no circle, or graphlib raises and names it."""
     names = {path: path.relative_to(PACKAGE).as_posix() for path in LAYERED}
-    graph = {
-        names[path]: {
-            names[to] for found in imports(path) if (to := file_of(found.module)) in names
+    TopologicalSorter(
+        {
+            name: {names[to] for found in imports(path) if (to := file_of(found.module)) in names}
+            - (ALLOWED_CIRCLE if name in ALLOWED_CIRCLE else set())
+            for path, name in names.items()
         }
-        for path in LAYERED
-    }
-    others = [" - ".join(sorted(circle)) for circle in circles(graph) if circle != ALLOWED_CIRCLE]
-    assert not others, "\n".join(others)
+    ).prepare()
 
 
 def docstring_lines(tree):
@@ -359,123 +347,3 @@ def test_private_names_of_another_package_are_found(tmp_path):
 def is_private(name):
     """Whether a name is internal; `_repr_html_` and `__main__` are agreed with others."""
     return name.startswith("_") and not name.endswith("_")
-
-
-# functions whose result does not depend on the order of their argument
-ORDERLESS = {"all", "any", "frozenset", "len", "max", "min", "set", "sorted"}
-# functions that keep the order of their arguments
-ORDERED = {"dict.fromkeys", "enumerate", "iter", "list", "map", "tuple", "zip"}
-SET_METHODS = {"difference", "intersection", "symmetric_difference", "union"}
-SET_TYPES = {"AbstractSet", "Set", "frozenset", "set"}
-
-
-def is_set_type(annotation):
-    return annotation is not None and ast.unparse(annotation).split("[")[0] in SET_TYPES
-
-
-def is_set(node, known):
-    """Whether an expression is a set, as far as its text tells.
-
-    known: names of variables that hold sets, and of functions that return sets.
-    """
-    if isinstance(node, ast.Set | ast.SetComp):
-        return True
-    if isinstance(node, ast.Name | ast.Attribute):
-        return ast.unparse(node).removeprefix("self.") in known
-    if isinstance(node, ast.IfExp):
-        return is_set(node.body, known) or is_set(node.orelse, known)
-    if isinstance(node, ast.BinOp) and isinstance(
-        node.op, ast.Sub | ast.BitOr | ast.BitAnd | ast.BitXor
-    ):
-        views = [ast.unparse(side).endswith(".keys()") for side in (node.left, node.right)]
-        return any(views) or is_set(node.left, known) or is_set(node.right, known)
-    if isinstance(node, ast.Call):
-        called = ast.unparse(node.func).split("[")[0].rpartition(".")[2]
-        return called in {"frozenset", "set"} | SET_METHODS or f"{called}()" in known
-    return False
-
-
-def sets_in_order(tree, returning):
-    """Sets whose order a module uses: in a loop, a list, a dictionary or an unpacked argument.
-
-    returning: names of functions that return sets, such as "flat_foot_names()".
-    """
-    found = []
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    inner = {id(node) for function in functions for node in ast.walk(function)} - {
-        id(function) for function in functions
-    }
-    scopes = [list(ast.walk(function)) for function in functions]
-    scopes.append([node for node in ast.walk(tree) if id(node) not in inner])
-    for nodes in scopes:
-        known = set(returning)
-        for node in nodes:
-            if isinstance(node, ast.arg | ast.AnnAssign) and is_set_type(node.annotation):
-                known.add(node.arg if isinstance(node, ast.arg) else ast.unparse(node.target))
-            elif isinstance(node, ast.Assign) and is_set(node.value, known):
-                known |= {ast.unparse(target) for target in node.targets}
-        harmless = {  # arguments of functions for which the order is the same
-            id(argument)
-            for node in nodes
-            if isinstance(node, ast.Call) and ast.unparse(node.func) in ORDERLESS
-            for argument in node.args
-        }
-        harmless |= {
-            id(entry) for node in nodes if isinstance(node, ast.Set) for entry in node.elts
-        }
-        for node in nodes:
-            uses = []
-            if isinstance(node, ast.For):
-                uses = [node.iter]
-            elif isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp):
-                uses = [] if id(node) in harmless else [each.iter for each in node.generators]
-            elif isinstance(node, ast.Starred):
-                uses = [] if id(node) in harmless else [node.value]
-            elif isinstance(node, ast.Call) and id(node) not in harmless:
-                called = ast.unparse(node.func)
-                if called in ORDERED or called.endswith(".join"):
-                    uses = node.args
-            found += [use for use in uses if is_set(use, known)]
-    return found
-
-
-def test_nothing_depends_on_the_order_of_a_set():
-    """The order of a set of names changes with Python's hash seed, and with it the rounding."""
-    returning = {
-        f"{node.name}()"
-        for path in MODULES
-        for node in nodes(path)
-        if isinstance(node, ast.FunctionDef) and is_set_type(node.returns)
-    }
-    wrong = {
-        f"{relative(path)}:{node.lineno} uses the order of {ast.unparse(node)}"
-        for path in MODULES
-        for node in sets_in_order(parsed(path), returning)
-    }
-    assert not wrong, "\n".join(sorted(wrong))
-
-
-def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed():
-    wrong = [
-        "for foot in set(a) - set(b): pass",
-        "for foot in {'FL', 'FR'}: pass",
-        "x = [f for f in {g.name for g in gaits}]",
-        "x = {f: 1.0 for f in a.keys() - b}",
-        "x = list(set(a))",
-        "x = ', '.join(set(a))",
-        "feet = set(a)\nfor foot in feet: pass",
-        "def f(feet: set[str]): return [*feet]",
-        "for foot in names(): pass",
-        "x = sum(weight[f] for f in frozenset(a))",
-    ]
-    right = [
-        "for foot in sorted(set(a) - set(b)): pass",
-        "for foot in ('FL', 'FR'): pass",
-        "x = [f for f in a if f in set(b)]",
-        "x = all(f in b for f in set(a))",
-        "x = {f for f in set(a)}",
-        "x = len(set(a)), sorted({*set(a), *b})",
-        "x = dict.fromkeys(a)",
-    ]
-    assert [len(sets_in_order(ast.parse(line), {"names()"})) for line in wrong] == [1] * len(wrong)
-    assert not any(sets_in_order(ast.parse(line), {"names()"}) for line in right)
