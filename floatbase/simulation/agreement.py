@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from floatbase.errors import SimulationError
-from floatbase.robots import Robot
+from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
 
 _N_STATES = 2
@@ -31,8 +32,28 @@ def check_agreement(robot: Robot, model: mujoco.MjModel) -> None:
             if not np.abs(theirs - ours).max() <= _TOLERANCE * np.abs(ours).max()
         ]
         if different:
+            links = _different_links(data, state)
+            where = f", at the links {', '.join(links)}" if links else ""
             raise SimulationError(
                 f"MuJoCo's model of {robot.name} differs from Pinocchio's in "
-                f"{', '.join(different)}. The controller would use another model than the "
+                f"{', '.join(different)}{where}. The controller would use another model than the "
                 f"simulation. Load the robot again if its model was changed after loading."
             )
+
+
+def _different_links(data: mujoco.MjData, state: State) -> list[str]:
+    """Return the links whose inertia or position differs between MuJoCo and Pinocchio."""
+    robot, model = state.robot, data.model
+    pin_data = robot.model.createData()
+    pin.forwardKinematics(robot.model, pin_data, np.array(state.q))
+    links = []
+    for i, name in list(enumerate(robot.model.names))[1:]:
+        is_base = robot.is_floating and i == 1  # MuJoCo's first joint
+        body = int(model.jnt_bodyid[0] if is_base else model.joint(name).bodyid[0])
+        axes = data.ximat[body].reshape(3, 3)
+        tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
+        theirs = pin.Inertia(float(model.body_mass[body]), data.xipos[body], tensor).matrix()
+        ours = pin_data.oMi[i].act(robot.model.inertias[i]).matrix()
+        if np.abs(theirs - ours).max() > _TOLERANCE * np.abs(ours).max():
+            links.append(model.body(body).name)
+    return links
