@@ -2,8 +2,6 @@
 be drawn anew, the slow files first.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys

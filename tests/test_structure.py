@@ -1,7 +1,5 @@
 """The structure of the package: layers, public APIs, circular imports, sizes and docstrings."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import re

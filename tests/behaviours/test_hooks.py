@@ -1,7 +1,5 @@
 """What a user can change in a `Walk`: tasks, footholds, adjustment, swings, ground, pose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -139,7 +137,7 @@ def test_swings_may_have_another_shape_or_class():
         def __call__(self, t: float) -> Any:
             return self._swing(t)
 
-        def with_end(self, end: npt.ArrayLike) -> Wrapped:
+        def with_end(self, end: npt.ArrayLike) -> Any:
             return Wrapped(self._swing.with_end(end))
 
     def high(start: np.ndarray, end: np.ndarray, *others: float) -> Swing:

@@ -4,8 +4,6 @@ All run with a control period of 2 ms. `benchmarks/walking.py` has the long runs
 and thirty pushes each.
 """
 
-from __future__ import annotations
-
 import copy
 import itertools
 import os

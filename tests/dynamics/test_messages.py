@@ -1,7 +1,5 @@
 """Errors of contacts and equations of motion: their types, and the names and numbers in them."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -9,6 +7,7 @@ from messages import refused
 
 import floatbase as fb
 from floatbase.dynamics import (
+    EquationsOfMotion,
     FlatFootContact,
     LinearConstraint,
     PointContact,
@@ -26,11 +25,11 @@ STATE = GO2.standing()
 X, UP = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
-def eom(contacts: object = ALL, state: object = STATE) -> fb.EquationsOfMotion:
+def eom(contacts: object = ALL, state: object = STATE) -> EquationsOfMotion:
     return fb.equations_of_motion(state, contacts)
 
 
-def constrained(A: np.ndarray, b: np.ndarray) -> fb.EquationsOfMotion:
+def constrained(A: np.ndarray, b: np.ndarray) -> EquationsOfMotion:
     return eom(fb.Contacts([LinearConstraint("bad", 2, lambda state, t: (A, b))]))
 
 

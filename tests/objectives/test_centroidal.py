@@ -1,7 +1,5 @@
 """Centroidal dynamics, eqs. (20)-(25), against momentum from MuJoCo and Pinocchio, and cvxpy."""
 
-from __future__ import annotations
-
 import cvxpy as cp
 import judges
 import mujoco

@@ -1,7 +1,5 @@
 """Errors of simulations and rollouts: their types, and the names and numbers in their messages."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import warnings

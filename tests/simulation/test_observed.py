@@ -1,7 +1,5 @@
 """Controllers with a noisy, late or user-defined observation of the state."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from types import SimpleNamespace

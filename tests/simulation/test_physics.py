@@ -1,7 +1,5 @@
 """Gravity, pushes, motors, ground and measured forces obey Newton's laws."""
 
-from __future__ import annotations
-
 import copy
 
 import judges

@@ -1,7 +1,5 @@
 """A sweep gives one table, for any number of workers, anywhere, and however often it was killed."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess
