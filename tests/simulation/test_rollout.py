@@ -212,15 +212,6 @@ def test_moving_targets_see_the_simulations_clock(sim):
     assert np.allclose(seen, [0.0, 0.001, 0.002, 0.003, 0.004])
 
 
-def test_forces_of_feet_that_the_controller_does_not_use_are_left_out():
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot).without("FL_foot")
-    controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
-    record = fb.rollout(fb.Simulation(robot), controller, 0.02)
-    assert record.measured.shape == (20, 9)
-    assert record.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
-
-
 def test_a_flat_foot_taken_as_a_point_is_measured_by_all_its_corners():
     robot, flat = judges.load("talos"), judges.controller_of("talos")
 
