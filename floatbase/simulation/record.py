@@ -453,8 +453,4 @@ class Recorder:
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)
             all_positions.append(positions)
-        forces, positions = (
-            np.concatenate(all_forces, axis=1),
-            np.concatenate(all_positions, axis=1),
-        )
-        return read_only(forces), read_only(positions)
+        return read_only(np.concatenate(all_forces, 1)), read_only(np.concatenate(all_positions, 1))
