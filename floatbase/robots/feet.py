@@ -231,11 +231,9 @@ def _bent_posture(robot: Robot) -> Array | None:
     found = least_squares(
         lambda x: np.concatenate([errors(x), _NEARNESS * x]), kick, bounds=(lower, upper)
     )
-    return (
-        clamp_to_limits(model, bend(found.x.round(_DIGITS)))
-        if abs(errors(found.x)).max() < _MAX_ERROR
-        else None
-    )
+    if abs(errors(found.x)).max() >= _MAX_ERROR:
+        return None
+    return clamp_to_limits(model, bend(found.x.round(_DIGITS)))
 
 
 def _links_of(model: pin.Model, joint: int) -> list[str]:
