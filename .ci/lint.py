@@ -349,8 +349,13 @@ BUDGETS = {
 }  # fmt: skip
 
 
+MAX_LINES = 400  # of a module, without docstrings
+
+
 def sizes() -> Faults:
-    """No part of the code is larger than its budget. The sizes of all parts are printed."""
+    """No module is too long, and no part of the code is larger than its budget. The sizes of all
+    parts are printed.
+    """
     found: Counter[str] = Counter()
     folders = "floatbase", "tests", "benchmarks", "examples", ".ci", "assets"
     for path in (path for folder in folders for path in (ROOT / folder).rglob("*.py")):
@@ -361,11 +366,15 @@ def sizes() -> Faults:
         if top == "floatbase" and inner and inner[0] in ("lessons", "viewer", "playground", "live"):
             part = inner[0]
         source = path.read_text(encoding="utf-8")
-        documented = _docstring_lines(source)
+        documented, lines = _docstring_lines(source), source.splitlines()
+        if top == "floatbase" and len(lines) - len(documented) > MAX_LINES:
+            yield f"{path.relative_to(ROOT)} has more than {MAX_LINES} lines without docstrings"
+        if top == "floatbase" and re.search("TODO|FIXME|XXX", source):
+            yield f"{path.relative_to(ROOT)} is not finished"
         found["docstrings"] += len(documented)
         found[part] += sum(
             number not in documented and not re.fullmatch(r"\s*(#.*)?", line)
-            for number, line in enumerate(source.splitlines(), 1)
+            for number, line in enumerate(lines, 1)
         )
     print("lines of code:", ", ".join(f"{part} {n:,}" for part, n in sorted(found.items())))
     for part, most in BUDGETS.items():
@@ -384,10 +393,18 @@ def _docstring_lines(source: str) -> set[int]:
     return lines
 
 
+def javascript() -> Faults:
+    """Lines of JavaScript are at most 100 characters long. Ruff checks those of Python."""
+    for path in sorted((ROOT / "floatbase/viewer/web/src").rglob("*.js")):
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+            if len(line) > 100:
+                yield f"{path.relative_to(ROOT)}:{number} has {len(line)} characters"
+
+
 CHECKS: tuple[Callable[[], Faults], ...]
 CHECKS = (
     lock, imports, private_names, version, container, pythons, scripts, hub, workflows, commands,
-    pages, sizes,
+    pages, sizes, javascript,
 )  # fmt: skip
 
 

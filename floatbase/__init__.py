@@ -76,16 +76,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 # heavy packages, imported on first use: mujoco for Simulation, meshcat for Viewer
-_LAZY = {
-    "Ground": "floatbase.simulation",
-    "Push": "floatbase.simulation",
-    "Rollout": "floatbase.simulation",
-    "Simulation": "floatbase.simulation",
-    "Viewer": "floatbase.viewer",
-    "push_recovery": "floatbase.simulation",
-    "rollout": "floatbase.simulation",
-    "sweep": "floatbase.simulation",
-}
+_SIMULATION = "Ground", "Push", "Rollout", "Simulation", "push_recovery", "rollout", "sweep"
+_LAZY = dict.fromkeys(_SIMULATION, "floatbase.simulation") | {"Viewer": "floatbase.viewer"}
 
 __all__ = [
     "QP", "Affine", "CoMTask", "Contacts", "FloatbaseError", "ForceTask", "FrameTask", "Ground",

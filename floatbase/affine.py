@@ -323,26 +323,6 @@ class Quadratic(Value):
         return Quadratic(w * A.T @ A, -w * A.T @ r, 0.5 * w * float(r @ r))
 
     @staticmethod
-    def from_affine(residual: Affine, weight: float = 1.0) -> Quadratic:
-        """Make the cost (weight / 2) ‖residual(x)‖².
-
-        Parameters
-        ----------
-        residual : Affine
-            Residual as a map of x.
-        weight : float, optional
-            Weight ≥ 0, dimensionless or per squared unit of the residual.
-
-        Returns
-        -------
-        Quadratic
-            Cost on x.
-        """
-        return Quadratic.from_residual(
-            as_instance("residual", residual, Affine).A, -residual.b, weight
-        )
-
-    @staticmethod
     def zero(n: int) -> Quadratic:
         """Make the cost that is zero everywhere.
 

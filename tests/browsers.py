@@ -1,7 +1,5 @@
 """The browser that tests look at pages with: the system's Chromium, where there is one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial

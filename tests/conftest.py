@@ -2,8 +2,6 @@
 be drawn anew, the slow files first.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys
@@ -21,14 +19,7 @@ from costs import Costs
 # What takes longest is started first, so that no worker is left alone with it at the end:
 # each lesson by itself, and these files as a whole.
 LESSONS = "test_a_lesson_prints_what_is_stored_and_its_learner_can_answer_everything"
-SLOWEST = (
-    "test_site",
-    "test_lab",
-    "test_hub",
-    "test_voila",
-    "test_playground_page",
-    "test_main",
-)
+SLOWEST = ("test_site", "test_lab", "test_hub", "test_voila", "test_playground_page", "test_main")
 ENDING = 5.0  # s that a process may take to end after the tests have ended it
 
 os.environ.setdefault("MPLBACKEND", "Agg")

@@ -4,8 +4,6 @@ Machines differ, and the same machine differs from hour to hour, so the budgets 
 piece of work that is timed in the same run.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Residuals of tasks by finite differences of Pinocchio's kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

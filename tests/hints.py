@@ -1,7 +1,5 @@
 """Answers to exercises."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

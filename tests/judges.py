@@ -4,12 +4,10 @@ differences, brute force.
 Lists of robots are collected from the package, so a robot that joins the catalogue joins the tests.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import mujoco
 import numpy as np
@@ -212,7 +210,7 @@ class Mujoco:
         self.data = mujoco.MjData(self.model)
         self.convert = Conversion(robot, self.model)
 
-    def move_to(self, state: State) -> Mujoco:
+    def move_to(self, state: State) -> Self:
         """Move MuJoCo's model to a state."""
         self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
         mujoco.mj_fwdPosition(self.model, self.data)

@@ -1,7 +1,5 @@
 """JupyterLab with a lesson in a real browser: run it, move its sliders, push its robot."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

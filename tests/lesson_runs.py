@@ -5,8 +5,6 @@ processor time. Each lesson has two processes, nbval's and its kernel's. Both ar
 start a thread.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import multiprocessing
@@ -16,7 +14,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 MARK = "FLOATBASE_STARTED_BY_TEST"
 PRINTED = "printed.txt"
@@ -69,7 +67,7 @@ class ForkedKernel:
         self._process = FORK.Process(target=_serve, args=(self.file,))
         self._process.start()
 
-    def started(self, startup_timeout: float, **_: Any) -> tuple[ForkedKernel, Any]:
+    def started(self, startup_timeout: float, **_: Any) -> tuple[Self, Any]:
         """Return this manager and a client, in place of nbval's `start_new_kernel`."""
         from jupyter_client import BlockingKernelClient
 

@@ -1,7 +1,5 @@
 """Answers and runs of the Python library, which the engine of the web page must repeat."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +11,7 @@ import pinocchio as pin
 
 import floatbase as fb
 from floatbase.behaviours import Walk
+from floatbase.control import Command
 from floatbase.control.tick import tick
 from floatbase.live import robots
 from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
@@ -143,7 +142,7 @@ class _RecordedWalk:
     def contacts(self) -> fb.Contacts:
         return self.walk.contacts
 
-    def __call__(self, q: Any, v: Any, t: float = 0.0) -> fb.Command:
+    def __call__(self, q: Any, v: Any, t: float = 0.0) -> Command:
         walk, settings = self.walk, self.schedule.get(round(t, 6))
         if settings and t > 0.0:
             if settings[0] is None:

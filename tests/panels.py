@@ -1,7 +1,5 @@
 """What every panel of sliders must do, claimed of the panels of a lesson without a browser."""
 
-from __future__ import annotations
-
 import gc
 import re
 from pathlib import Path

@@ -5,8 +5,6 @@ New functions are tested without an entry here. Right arguments come from `value
 and by name. What each kind of check refuses is tested once, with all of `WRONG`.
 """
 
-from __future__ import annotations
-
 import inspect
 import warnings
 from collections.abc import Callable

@@ -7,8 +7,6 @@ else. All servers run as one user of this machine, so what keeps students from e
 the hub; on a class's machine their accounts do, too.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,14 +1,12 @@
-"""The structure of the package: layers, public APIs, circular imports, sizes and docstrings."""
-
-from __future__ import annotations
+"""The structure of the package: layers, public APIs and circular imports."""
 
 import ast
-import inspect
 import re
 from functools import cache
+from graphlib import TopologicalSorter
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple, get_origin
+from typing import NamedTuple
 
 from messages import raises
 
@@ -36,8 +34,6 @@ LAYERS = """
     doctor __main__
 """
 LAYER_OF = {name: layer for layer, line in enumerate(LAYERS.split("\n")) for name in line.split()}
-MAX_LINES = 400  # of a module, without docstrings
-MAX_LINE_LENGTH = 100
 # the price of robot.standing() and state.robot
 ALLOWED_CIRCLE = {"robots/robot.py", "robots/standing.py", "robots/state.py"}
 # numba loads with them, so no __init__ imports them
@@ -47,7 +43,6 @@ COMPILED = {
     "floatbase.control.tick.jit",
     "floatbase.control.tick.tick",
 }
-BUILT = ("dist", "node_modules", "vendor")  # folders of JavaScript that nobody writes by hand
 MODULES = sorted(
     path
     for path in PACKAGE.rglob("*.py")
@@ -127,19 +122,6 @@ def imports(path):
     return [one for one in found if one.module.split(".")[0] == "floatbase"]
 
 
-def circles(graph):
-    """Sets of files that import one another, directly or not."""
-    reachable = {node: set(targets) for node, targets in graph.items()}
-    for middle in graph:  # Warshall's algorithm
-        for found in reachable.values():
-            if middle in found:
-                found |= reachable[middle]
-    rings = {
-        frozenset(other for other in reachable[node] if node in reachable[other]) for node in graph
-    }
-    return [set(ring) for ring in rings if ring]
-
-
 def test_every_module_has_a_layer():
     assert {path.relative_to(PACKAGE).parts[0].removesuffix(".py") for path in LAYERED} <= set(
         LAYER_OF
@@ -217,69 +199,20 @@ def top_folder(path):
 
 
 def test_only_robot_state_and_standing_import_one_another():
+    """The order of the other modules has no circle, or graphlib raises and names it."""
     names = {path: path.relative_to(PACKAGE).as_posix() for path in LAYERED}
-    graph = {
-        names[path]: {
-            names[to] for found in imports(path) if (to := file_of(found.module)) in names
+    TopologicalSorter(
+        {
+            name: {names[to] for found in imports(path) if (to := file_of(found.module)) in names}
+            - (ALLOWED_CIRCLE if name in ALLOWED_CIRCLE else set())
+            for path, name in names.items()
         }
-        for path in LAYERED
-    }
-    others = [" - ".join(sorted(circle)) for circle in circles(graph) if circle != ALLOWED_CIRCLE]
-    assert not others, "\n".join(others)
-
-
-def docstring_lines(tree):
-    """Count the lines of all docstrings of a module."""
-    strings = [
-        node.body[0]
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node)
-    ]
-    return sum(1 + (string.end_lineno or 0) - string.lineno for string in strings)
-
-
-def test_modules_are_short_documented_and_finished():
-    wrong = []
-    for path in MODULES:
-        source = path.read_text(encoding="utf-8")
-        count = len(source.splitlines()) - docstring_lines(parsed(path))
-        if count > MAX_LINES:
-            wrong.append(f"{relative(path)} has {count} lines without docstrings")
-        if not ast.get_docstring(parsed(path)):
-            wrong.append(f"{relative(path)} has no docstring")
-        words = [word for word in ("TODO", "FIXME", "XXX") if word in source]
-        wrong += [f"{relative(path)} contains {word}" for word in words]
-    assert not wrong, "\n".join(wrong)
+    ).prepare()
 
 
 def test_no_lock_stays_locked_after_an_interrupt():
     calls = {relative(path): re.findall(r"\bLock\(\)", path.read_text("utf-8")) for path in MODULES}
     assert not any(calls.values()), "use InterruptibleLock of floatbase._locks"
-
-
-def test_lines_of_javascript_are_at_most_100_characters_long():
-    """Ruff checks those of Python."""
-    wrong = [
-        f"{relative(path)}:{number} has {len(line)} characters"
-        for path in sorted((PACKAGE / "viewer" / "web" / "src").rglob("*.js"))
-        if not set(BUILT) & set(path.parts)
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-        if len(line) > MAX_LINE_LENGTH
-    ]
-    assert not wrong, "\n".join(wrong)
-
-
-def test_every_public_name_resolves_and_has_a_docstring():
-    wrong = []
-    for package in ["floatbase", *PACKAGES]:
-        module = import_module(package)
-        for name in public_names(package):
-            value = getattr(module, name)
-            doc = inspect.getdoc(value) or ""
-            needs_one = inspect.ismodule(value) or (callable(value) and not get_origin(value))
-            if needs_one and (not doc or doc.startswith(f"{name}(")):  # as dataclass writes it
-                wrong.append(f"{package}.{name} has no docstring of its own")
-    assert not wrong, "\n".join(wrong)
 
 
 def test_floatbase_has_at_most_33_names_and_lists_them():
@@ -359,123 +292,3 @@ def test_private_names_of_another_package_are_found(tmp_path):
 def is_private(name):
     """Whether a name is internal; `_repr_html_` and `__main__` are agreed with others."""
     return name.startswith("_") and not name.endswith("_")
-
-
-# functions whose result does not depend on the order of their argument
-ORDERLESS = {"all", "any", "frozenset", "len", "max", "min", "set", "sorted"}
-# functions that keep the order of their arguments
-ORDERED = {"dict.fromkeys", "enumerate", "iter", "list", "map", "tuple", "zip"}
-SET_METHODS = {"difference", "intersection", "symmetric_difference", "union"}
-SET_TYPES = {"AbstractSet", "Set", "frozenset", "set"}
-
-
-def is_set_type(annotation):
-    return annotation is not None and ast.unparse(annotation).split("[")[0] in SET_TYPES
-
-
-def is_set(node, known):
-    """Whether an expression is a set, as far as its text tells.
-
-    known: names of variables that hold sets, and of functions that return sets.
-    """
-    if isinstance(node, ast.Set | ast.SetComp):
-        return True
-    if isinstance(node, ast.Name | ast.Attribute):
-        return ast.unparse(node).removeprefix("self.") in known
-    if isinstance(node, ast.IfExp):
-        return is_set(node.body, known) or is_set(node.orelse, known)
-    if isinstance(node, ast.BinOp) and isinstance(
-        node.op, ast.Sub | ast.BitOr | ast.BitAnd | ast.BitXor
-    ):
-        views = [ast.unparse(side).endswith(".keys()") for side in (node.left, node.right)]
-        return any(views) or is_set(node.left, known) or is_set(node.right, known)
-    if isinstance(node, ast.Call):
-        called = ast.unparse(node.func).split("[")[0].rpartition(".")[2]
-        return called in {"frozenset", "set"} | SET_METHODS or f"{called}()" in known
-    return False
-
-
-def sets_in_order(tree, returning):
-    """Sets whose order a module uses: in a loop, a list, a dictionary or an unpacked argument.
-
-    returning: names of functions that return sets, such as "flat_foot_names()".
-    """
-    found = []
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    inner = {id(node) for function in functions for node in ast.walk(function)} - {
-        id(function) for function in functions
-    }
-    scopes = [list(ast.walk(function)) for function in functions]
-    scopes.append([node for node in ast.walk(tree) if id(node) not in inner])
-    for nodes in scopes:
-        known = set(returning)
-        for node in nodes:
-            if isinstance(node, ast.arg | ast.AnnAssign) and is_set_type(node.annotation):
-                known.add(node.arg if isinstance(node, ast.arg) else ast.unparse(node.target))
-            elif isinstance(node, ast.Assign) and is_set(node.value, known):
-                known |= {ast.unparse(target) for target in node.targets}
-        harmless = {  # arguments of functions for which the order is the same
-            id(argument)
-            for node in nodes
-            if isinstance(node, ast.Call) and ast.unparse(node.func) in ORDERLESS
-            for argument in node.args
-        }
-        harmless |= {
-            id(entry) for node in nodes if isinstance(node, ast.Set) for entry in node.elts
-        }
-        for node in nodes:
-            uses = []
-            if isinstance(node, ast.For):
-                uses = [node.iter]
-            elif isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp):
-                uses = [] if id(node) in harmless else [each.iter for each in node.generators]
-            elif isinstance(node, ast.Starred):
-                uses = [] if id(node) in harmless else [node.value]
-            elif isinstance(node, ast.Call) and id(node) not in harmless:
-                called = ast.unparse(node.func)
-                if called in ORDERED or called.endswith(".join"):
-                    uses = node.args
-            found += [use for use in uses if is_set(use, known)]
-    return found
-
-
-def test_nothing_depends_on_the_order_of_a_set():
-    """The order of a set of names changes with Python's hash seed, and with it the rounding."""
-    returning = {
-        f"{node.name}()"
-        for path in MODULES
-        for node in nodes(path)
-        if isinstance(node, ast.FunctionDef) and is_set_type(node.returns)
-    }
-    wrong = {
-        f"{relative(path)}:{node.lineno} uses the order of {ast.unparse(node)}"
-        for path in MODULES
-        for node in sets_in_order(parsed(path), returning)
-    }
-    assert not wrong, "\n".join(sorted(wrong))
-
-
-def test_the_order_of_a_set_is_found_and_what_ignores_it_is_allowed():
-    wrong = [
-        "for foot in set(a) - set(b): pass",
-        "for foot in {'FL', 'FR'}: pass",
-        "x = [f for f in {g.name for g in gaits}]",
-        "x = {f: 1.0 for f in a.keys() - b}",
-        "x = list(set(a))",
-        "x = ', '.join(set(a))",
-        "feet = set(a)\nfor foot in feet: pass",
-        "def f(feet: set[str]): return [*feet]",
-        "for foot in names(): pass",
-        "x = sum(weight[f] for f in frozenset(a))",
-    ]
-    right = [
-        "for foot in sorted(set(a) - set(b)): pass",
-        "for foot in ('FL', 'FR'): pass",
-        "x = [f for f in a if f in set(b)]",
-        "x = all(f in b for f in set(a))",
-        "x = {f for f in set(a)}",
-        "x = len(set(a)), sorted({*set(a), *b})",
-        "x = dict.fromkeys(a)",
-    ]
-    assert [len(sets_in_order(ast.parse(line), {"names()"})) for line in wrong] == [1] * len(wrong)
-    assert not any(sets_in_order(ast.parse(line), {"names()"}) for line in right)

@@ -1,7 +1,5 @@
 """A value of every public class of the packages, for tests that hold for all of them."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -373,9 +373,7 @@ def grasp_matrix(points: Array, reference_point: Array) -> Array:
     -----
     [FBR]_, eqs. (20), (21).
     """
-    points, reference_point = (
-        as_array("points", points, (None, 3), "m"),
-        as_array("reference_point", reference_point, (3,), "m"),
-    )
+    points = as_array("points", points, (None, 3), "m")
+    reference_point = as_array("reference_point", reference_point, (3,), "m")
     blocks = [np.vstack([np.eye(3), pin.skew(point - reference_point)]) for point in points]
     return read_only(np.hstack([np.zeros((6, 0)), *blocks]))

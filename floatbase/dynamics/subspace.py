@@ -157,7 +157,6 @@ def torque_force_space(eom: EquationsOfMotion) -> Affine:
     -----
     [FBR]_, eqs. (11), (24).
     """
-    as_instance("eom", eom, EquationsOfMotion)
     return _orthonormalised(_torque_force_map(eom))
 
 
@@ -308,7 +307,6 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     >>> feasible_space(eom).dimension
     12
     """
-    as_instance("eom", eom, EquationsOfMotion)
     torque_force = _torque_force_map(eom)
     qdd = _acceleration_map(eom, torque_force["tau"], torque_force["forces"])
     return FeasibleSpace(
@@ -397,7 +395,6 @@ def dimensions(eom: EquationsOfMotion) -> Dimensions:
     Dimensions
         The numbers at this state, as in section 2.2 of the course text.
     """
-    as_instance("eom", eom, EquationsOfMotion)
     space = contact_space(eom)
     reactions = np.linalg.qr(eom.J.T @ space.force_map)[0]
     B = np.block([[eom.M, -eom.S, -reactions], [space.A, np.zeros((space.r, eom.d + space.r))]])

@@ -240,11 +240,9 @@ class FrictionCone(Value):
         if parts.alpha_par <= self.mu * parts.alpha_perp:
             return as_array("force", force, (3,), "N")
         scale = max(0.0, parts.alpha_perp + self.mu * parts.alpha_par) / (1.0 + self.mu**2)
-        return (
-            read_only(scale * (self.normal + self.mu * parts.f_par / parts.alpha_par))
-            if scale
-            else read_only(np.zeros(3))
-        )
+        if not scale:
+            return read_only(np.zeros(3))
+        return read_only(scale * (self.normal + self.mu * parts.f_par / parts.alpha_par))
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,11 +383,9 @@ class FrictionPolyhedron(Value):
             Indices of the facets; empty if the force pulls on the ground.
         """
         tangential, limit = self._tangential_forces(force)
-        return (
-            tuple(np.flatnonzero(tangential > (1.0 - ACTIVE_TOLERANCE) * limit).tolist())
-            if limit > 0.0
-            else ()
-        )
+        if limit <= 0.0:
+            return ()
+        return tuple(np.flatnonzero(tangential > (1.0 - ACTIVE_TOLERANCE) * limit).tolist())
 
     def project(self, force: npt.ArrayLike) -> Array:
         """Return the force of the polyhedron that is nearest to a given force.

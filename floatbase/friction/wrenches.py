@@ -212,10 +212,8 @@ class WrenchSet(Value):
             raise InputError("direction is the zero wrench, but it must be non-zero.")
         w = as_array("start", np.zeros(6) if start is None else start, (6,))
         N, scale = self.rays.shape[1], float(np.linalg.norm(self._wrench_scaling @ d))
-        A, b = (
-            self._wrench_scaling @ np.column_stack([self.rays, -d / scale]),
-            self._wrench_scaling @ w,
-        )
+        A = self._wrench_scaling @ np.column_stack([self.rays, -d / scale])
+        b = self._wrench_scaling @ w
         bounds = [(0.0, None)] * N + [(None, None)]
         cost = np.append(np.zeros(N), -1.0)
         result = linear_program(cost, (A, b), self._limit_inequalities(1), bounds)

@@ -31,12 +31,7 @@ _LAZY = {
     "recall": "recalling",
     **dict.fromkeys(("SliderPanel", "live_run", "push_panel", "slider_panel"), "panels"),
     **dict.fromkeys(
-        (
-            "measured_push_recovery",
-            "plot_push_recovery",
-            "controller_factory",
-        ),
-        "push_recovery",
+        ("measured_push_recovery", "plot_push_recovery", "controller_factory"), "push_recovery"
     ),
     "slider_samples": "slider_samples",
     "FIGURES": "figures",

@@ -29,34 +29,16 @@ unsaved: deque[bytes] = deque()  # lines of this process that could not be writt
 
 
 def path() -> Path:
-    """Return the path of the file in which progress is stored.
+    """Return the path of the file in which progress is stored, which may not exist yet.
 
     The file is progress.jsonl in the folder that the environment variable FLOATBASE_HOME names, by
-    default ~/.floatbase.
-
-    Returns
-    -------
-    Path
-        The path; the file may not exist yet.
-
-    Raises
-    ------
-    RuntimeError
-        If FLOATBASE_HOME is not set and there is no home folder.
+    default ~/.floatbase. Without a home folder either, this is a `RuntimeError`.
     """
     return Path(os.environ.get("FLOATBASE_HOME") or Path.home() / ".floatbase") / _FILE_NAME
 
 
 def load() -> dict[str, dict[str, int]]:
-    """Return the number of tries and of right answers for each exercise that was tried.
-
-    Damaged lines are ignored.
-
-    Returns
-    -------
-    dict of str to dict
-        For each exercise: {"tries": n, "right": m}.
-    """
+    """Return {"tries": n, "right": m} for each exercise that was tried; ignore damaged lines."""
     tried: dict[str, dict[str, int]] = {}
     for text in _lines():
         for name, tries, right in _try_counts(text):
@@ -69,17 +51,8 @@ def load() -> dict[str, dict[str, int]]:
 def record_try(name: str, right: bool, answer: Any = None, numbers: str = "") -> None:
     """Record a try of an exercise; see `append`.
 
-    Parameters
-    ----------
-    name : str
-        Name of the exercise.
-    right : bool
-        Whether the answer was right.
-    answer : object, optional
-        The answer. Numbers and names are stored as they are, a function as its source code, which
-        is never run.
-    numbers : str, optional
-        Id of the student whose numbers were used; "" for the numbers in the lesson.
+    Numbers and names of an answer are stored as they are, a function as its source code, which is
+    never run. numbers: id of the student whose numbers were used; "" for those in the lesson.
     """
     entry = {"tries": 1, "right": int(right), "answer": as_json(answer)}
     append(name, entry | ({"numbers": numbers} if numbers else {}))
@@ -88,22 +61,13 @@ def record_try(name: str, right: bool, answer: Any = None, numbers: str = "") ->
 def answers() -> dict[str, Any]:
     """Return the last right answer to each exercise, or the last answer if none was right.
 
-    Returns
-    -------
-    dict of str to object
-        For each exercise that was tried: the answer in the form of `as_json`.
+    The answers have the form of `as_json`.
     """
     return {name: entry["answer"] for name, entry in _kept_tries().items()}
 
 
 def numbers() -> dict[str, str]:
-    """Return whose numbers each of the `answers` uses.
-
-    Returns
-    -------
-    dict of str to str
-        For each exercise that was tried: the id of a student, or "" for the numbers in the lesson.
-    """
+    """Return whose numbers each of the `answers` uses: a student's id, or "" for the lesson's."""
     kept = {name: str(entry.get("numbers", "")) for name, entry in _kept_tries().items()}
     return {name: student if student.isprintable() else "" for name, student in kept.items()}
 
@@ -120,14 +84,7 @@ def _kept_tries() -> dict[str, dict[str, Any]]:
 
 
 def predictions() -> dict[str, dict[str, Any]]:
-    """Return the latest predictions.
-
-    Returns
-    -------
-    dict of str to dict
-        For each prediction: {"said": …, "unit": …, "sure": …, "is": …}, as far as they are known;
-        see `append`.
-    """
+    """Return {"said": …, "unit": …, "sure": …, "is": …} of the latest predictions; see `append`."""
     found: dict[str, dict[str, Any]] = {}
     for text in _lines():
         for name, entry in _entries(text):
@@ -143,10 +100,7 @@ def predictions() -> dict[str, dict[str, Any]]:
 def history() -> dict[str, list[dict[str, Any]]]:
     """Return all entries about each prediction, in the order in which they were written.
 
-    Returns
-    -------
-    dict of str to list of dict
-        For each prediction: its entries with a usable "said", "is" or "recalled".
+    These are the entries with a usable "said", "is" or "recalled".
     """
     found: dict[str, list[dict[str, Any]]] = {}
     for text in _lines():
@@ -181,15 +135,8 @@ def append(name: str, entry: dict[str, Any]) -> None:
     """Append a line about an exercise or a prediction to the file.
 
     If the file cannot be written, the reason is printed. The line is then kept in memory until a
-    later call can write it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the exercise or prediction.
-    entry : dict
-        What to store. In predictions, "said" and "is" are a number, a list of numbers or a string,
-        "unit" is a string, and "sure" is True or False.
+    later call can write it. In predictions, "said" and "is" are a number, a list of numbers or a
+    string, "unit" is a string, and "sure" is True or False.
     """
     extend([(name, entry)])
 
@@ -247,16 +194,6 @@ def as_json(answer: Any) -> Any:
 
     `from_json` returns an answer that a judge treats in the same way. For a function, only the
     source code is kept.
-
-    Parameters
-    ----------
-    answer : object
-        Any answer of a learner.
-
-    Returns
-    -------
-    object
-        Something that `json` can write.
     """
     try:
         kept = _as_json(answer)
@@ -290,20 +227,7 @@ def _source_of(function: Any) -> str:
 def from_json(kept: Any) -> Any:
     """Restore an answer that `as_json` converted.
 
-    Parameters
-    ----------
-    kept : object
-        The stored form of the answer.
-
-    Returns
-    -------
-    object
-        The answer.
-
-    Raises
-    ------
-    ValueError
-        If the stored form is damaged. Other errors of Python are possible, too.
+    A damaged form is a `ValueError` or another error of Python.
     """
     if isinstance(kept, list) and (array := numeric_copy(kept)) is not None:
         return array

@@ -22,22 +22,7 @@ WALL: RGB = (0.78, 0.76, 0.72)
 
 
 def rod_between(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, colour: RGB) -> Item:
-    """Draw a rod from one point to another.
-
-    Parameters
-    ----------
-    start, end : array_like, shape (3,)
-        The points in the world frame [m].
-    radius : float
-        Radius [m].
-    colour : tuple of float
-        Red, green and blue, from 0 to 1.
-
-    Returns
-    -------
-    Item
-        Item for `extra` of `Viewer.show`.
-    """
+    """Draw a rod between two points in the world frame [m]."""
     begin = np.asarray(start, dtype=np.float64)
     way = np.asarray(end, dtype=np.float64) - begin
     length = float(np.linalg.norm(way))
@@ -51,26 +36,9 @@ def wheel(
     angle: float,
     width: float | None = None,
 ) -> Item:
-    """Draw a wheel with spokes, one of which is marked.
+    """Draw a wheel with spokes, one of which is marked and points upwards at the angle 0 [rad].
 
-    Parameters
-    ----------
-    centre : array_like, shape (3,)
-        Centre of the wheel in the world frame [m].
-    axis : array_like, shape (3,)
-        Direction of the axle in the world frame.
-    radius : float
-        Radius [m].
-    angle : float
-        Angle of rotation about the axle, by the right-hand rule [rad]. At 0 the marked spoke points
-        upwards.
-    width : float, optional
-        Width [m]; by default 0.35 of the radius.
-
-    Returns
-    -------
-    Item
-        Item for `extra` of `Viewer.show`.
+    The width [m] is 0.35 of the radius by default.
     """
     axle = unit_vector("axis of the wheel", axis)
     as_positive("radius of the wheel", radius, "m")
@@ -112,25 +80,8 @@ def hydraulic_cylinder(
 ) -> Picture:
     """Draw a double-acting hydraulic cylinder: barrel, rod, piston and two chambers.
 
-    Parameters
-    ----------
-    base, end : array_like, shape (3,)
-        The two ends in the world frame [m].
-    stroke : tuple of float
-        Smallest and largest distance between the ends [m].
-    pressures : tuple of float, optional
-        Pressure of the chamber at the base and of the chamber around the rod, from 0 (pale) to 1
-        (full colour) [-].
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
-
-    Raises
-    ------
-    InputError
-        If `stroke` is not positive and in ascending order.
+    stroke: smallest and largest distance between the ends [m]. pressures: of the chamber at the
+    base and of the chamber around the rod, from 0 (pale) to 1 (full colour).
     """
     if not 0.0 < stroke[0] < stroke[1]:
         raise InputError(

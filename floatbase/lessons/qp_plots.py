@@ -147,22 +147,8 @@ def _plot_arrow(
 def feasible_polygon(qp: QP, box: Box) -> Array:
     """Return the corners of the feasible set of a QP with two variables, within a box.
 
-    Parameters
-    ----------
-    qp : QP
-        QP of two variables without equality constraints.
-    box : tuple of float
-        Range: minimum and maximum of the first variable, then of the second.
-
-    Returns
-    -------
-    ndarray, shape (k, 2)
-        Corners in order; none if the feasible set does not meet the box.
-
-    Raises
-    ------
-    InputError
-        If the QP does not have two variables, or has equality constraints.
+    The corners, shape (k, 2), are in order; there are none if the feasible set does not meet the
+    box.
     """
     if as_instance("qp", qp, QP).n != 2 or len(qp.A):
         raise InputError(

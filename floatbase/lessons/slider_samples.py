@@ -106,19 +106,7 @@ def _slider_samples(slider: Any, given: Sequence[float] | None, count: int) -> t
 def combinations(counts: Sequence[int], first: Sequence[int]) -> tuple[list[tuple[int, ...]], bool]:
     """Return the combinations of positions to compute, and whether these are all combinations.
 
-    Parameters
-    ----------
-    counts : sequence of int
-        Number of positions of each slider.
-    first : sequence of int
-        Index of the initial position of each slider.
-
-    Returns
-    -------
-    list of tuple of int
-        For each combination, the index of the position of each slider.
-    bool
-        Whether the list is complete.
+    counts: number of positions of each slider. first: index of the initial position of each.
     """
     if math.prod(counts) <= MAX_COMBINATIONS:
         return list(product(*(range(count) for count in counts))), True
@@ -163,19 +151,8 @@ def recorded_pushes(
 ) -> dict[str, Any]:
     """Return the mimebundle of recorded pushes for a static page; without a push, the robots stand.
 
-    Parameters
-    ----------
-    titles : mapping of str to tuple
-        For each picture title: the viewer, simulation and controller.
-    forces : iterable of float
-        Forces of the pushes [N].
-    directions : sequence of str
-        Names of the directions, keys of `DIRECTIONS`.
-
-    Returns
-    -------
-    dict
-        The mimebundle.
+    titles: viewer, simulation and controller for each picture title. directions: keys of
+    `DIRECTIONS`.
     """
     sizes, views = tuple(forces), [view for view, *_ in titles.values()]
     for view, sim, controller in titles.values():

@@ -33,23 +33,8 @@ _END = (protocol.ANIMATION[0], protocol.ANIMATION[1], "end")
 class Control:
     """Control on a static page, with a fixed number of positions.
 
-    Parameters
-    ----------
-    name : str
-        Label of the control.
-    values : tuple of str
-        Label of each position.
-    first : int
-        Index of the initial position.
-    kind : {"range", "choice", "switch"}
-        "range" is a slider, "choice" selects one of several, "switch" is off or on.
-    unit : str
-        Unit of the values.
-
-    Raises
-    ------
-    ViewerError
-        If the kind is unknown or the initial position does not exist.
+    `values` are the labels of the positions, and `first` is the index of the initial one. The kind
+    "range" is a slider, "choice" selects one of several, and "switch" is off or on.
     """
 
     name: str
@@ -70,16 +55,8 @@ class Control:
 class StaticExport:
     """Scenes that viewers show now, and those at other positions of the controls.
 
-    Parameters
-    ----------
-    views : sequence of Viewer
-        Viewers, side by side; none if the notes contain everything there is to see.
-    beside : bool, optional
-        Whether a note is to the right of the pictures.
-    words : str, optional
-        Text below the pictures, such as what only the live lesson can do.
-    titles : sequence of str, optional
-        Title above each picture.
+    The views are side by side, with a note to their right if `beside`. `words` is a text below
+    them, such as what only the live lesson can do.
     """
 
     def __init__(
@@ -110,12 +87,7 @@ class StaticExport:
     def add_sample(self, at: Iterable[int], note: str = "") -> None:
         """Add what the viewers show now as the picture at one position of the controls.
 
-        Parameters
-        ----------
-        at : iterable of int
-            Index of the position of each control.
-        note : str, optional
-            The note at this position, as HTML.
+        at: index of the position of each control. note: HTML.
         """
         scenes = [_entries(view.window.scene) for view in self._views]
         changed = [
@@ -127,17 +99,7 @@ class StaticExport:
     def bundle(self, controls: Sequence[Control] = (), together: bool = True) -> dict[str, Any]:
         """Return the mimebundle of the display.
 
-        Parameters
-        ----------
-        controls : sequence of Control, optional
-            The controls.
-        together : bool, optional
-            Whether there is a picture for every combination of positions.
-
-        Returns
-        -------
-        dict
-            The mimebundle.
+        together: whether there is a picture for every combination of positions.
         """
         packed = gzip.compress(protocol.frame(self._commands), 6, mtime=0)
         data = {

@@ -166,7 +166,6 @@ def com_wrench_map(state: State, contacts: Contacts) -> Affine:
     -----
     [FBR]_, eqs. (20), (21).
     """
-    as_instance("state", state, State)
     _require_point_forces(contacts)
     return Affine.stack(
         force=Affine.linear(net_force_matrix(contacts)),
@@ -221,8 +220,8 @@ def wrench_objective(
     desired = np.concatenate(
         [as_array("force", force, (3,), "N"), as_array("moment", moment, (3,), "N·m")]
     )
-    residual = com_wrench_map(state, contacts) - desired
-    return Quadratic.from_affine(Affine.linear(np.diag(np.sqrt(weights))) @ residual)
+    scale = np.diag(np.sqrt(weights))
+    return Quadratic.from_residual(scale @ com_wrench_map(state, contacts).A, scale @ desired)
 
 
 def desired_wrench(
@@ -435,7 +434,6 @@ def torques_from_forces(eom: EquationsOfMotion) -> TorquesFromForces:
     -----
     [FBR]_, eqs. (24), (25).
     """
-    as_instance("eom", eom, EquationsOfMotion)
     A, b = resolved_constraint(eom)
     C_tau, C_forces = A @ np.linalg.solve(eom.M, eom.S), A @ np.linalg.solve(eom.M, eom.J.T)
     inverse, a = np.linalg.pinv(C_tau, rcond=RANK_TOLERANCE), b + A @ np.linalg.solve(eom.M, eom.h)

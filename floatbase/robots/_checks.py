@@ -120,17 +120,11 @@ def check_unit_norms(
         part = slice(model.idx_qs[i] + translations, model.idx_qs[i] + model.nqs[i])
         length = float(np.linalg.norm(q[part]))
         if model.nqs[i] != model.nvs[i] and abs(length - 1.0) > UNIT_NORM_TOLERANCE:
-            entries = f"{name}[{part.start}:{part.stop}]"
-            numbers = "pair (cos, sin)" if len(q[part]) == 2 else "quaternion"
-            floating = i == 1 and translations == 3
-            entries = (
-                f"The base quaternion {entries} (x y z w)"
-                if floating
-                else f"The {numbers} {entries} of joint {model.names[i]!r}"
-            )
+            numbers = "pair (cos, sin)" if len(q[part]) == 2 else "quaternion (x y z w)"
+            owner = "the base" if i == 1 and translations == 3 else f"joint {model.names[i]!r}"
             raise InputError(
-                f"{entries} has length {length:.8g}; the length must be 1. Divide by this "
-                f"length{hint}."
+                f"The {numbers} {name}[{part.start}:{part.stop}] of {owner} has length "
+                f"{length:.8g}; the length must be 1. Divide by this length{hint}."
             )
 
 

@@ -43,7 +43,7 @@ _MAX_ERROR = 1e-3  # m and rad: of the feet of bent legs; larger than the pull o
 _ONE_SIDED = 0.1
 _DIGITS = 6  # of lengths [m], so that rounding errors do not show
 # the corners of a sole: front left, front right, rear right, rear left
-_DIAGONALS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+DIAGONALS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 
 
 def as_feet(
@@ -231,11 +231,9 @@ def _bent_posture(robot: Robot) -> Array | None:
     found = least_squares(
         lambda x: np.concatenate([errors(x), _NEARNESS * x]), kick, bounds=(lower, upper)
     )
-    return (
-        clamp_to_limits(model, bend(found.x.round(_DIGITS)))
-        if abs(errors(found.x)).max() < _MAX_ERROR
-        else None
-    )
+    if abs(errors(found.x)).max() >= _MAX_ERROR:
+        return None
+    return clamp_to_limits(model, bend(found.x.round(_DIGITS)))
 
 
 def _links_of(model: pin.Model, joint: int) -> list[str]:
@@ -330,7 +328,7 @@ def _sole(placement: pin.SE3, shapes: list[Any]) -> Array | None:
     if len(sole) < 3 or np.any(np.ptp(sole[:, :2], axis=0) < _MIN_SOLE * size) or not size.all():
         return None
     # the corners farthest to the front left, front right, rear right and rear left
-    farthest = list(dict.fromkeys((sole[:, :2] @ (_DIAGONALS / size).T).argmax(axis=0).tolist()))
+    farthest = list(dict.fromkeys((sole[:, :2] @ (DIAGONALS / size).T).argmax(axis=0).tolist()))
     if len(farthest) < 3:
         return None
     corners = np.column_stack([sole[farthest, :2], np.full(len(farthest), bottom)])

@@ -8,6 +8,7 @@ import numpy as np
 
 from floatbase._validation import as_bool, as_instance, read_only
 from floatbase.errors import InputError
+from floatbase.robots.feet import DIAGONALS
 from floatbase.robots.loading import load_urdf
 from floatbase.robots.robot import Foot, Robot
 
@@ -50,12 +51,7 @@ def with_floating_base(robot: Robot, plate: bool = False) -> Robot:
     model = floating.model.copy()
     model.armature = np.concatenate([np.zeros(6), robot.model.armature])  # not in the URDF
     width, thickness = PLATE_SIZE
-    corners = np.array(
-        [
-            [x * width, y * width, -thickness]
-            for x, y in ((0.5, 0.5), (0.5, -0.5), (-0.5, -0.5), (-0.5, 0.5))
-        ]
-    )
+    corners = np.column_stack([0.5 * width * DIAGONALS, np.full(4, -thickness)])
     return replace(
         floating,
         model=model,

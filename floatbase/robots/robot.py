@@ -449,11 +449,9 @@ class Robot(Value):
         """
         from floatbase.robots.standing import find_standing_state
 
-        return (
-            self._standing
-            if height is normal is offset is None and surface is None and balanced is False
-            else find_standing_state(self, height, normal, offset, surface, balanced)
-        )
+        if height is normal is offset is None and surface is None and balanced is False:
+            return self._standing
+        return find_standing_state(self, height, normal, offset, surface, balanced)
 
     @cached_property
     def _standing(self) -> State:

@@ -145,7 +145,6 @@ def push_recovery(
     frame: str = "base",
     start: float = 0.2,
     observation_time: float = 1.5,
-    initial_force: float | None = None,
     resolution: float = 5.0,
     workers: int | None = None,
     cluster: Any = None,
@@ -175,11 +174,9 @@ def push_recovery(
         Time before the push, in which the robot settles [s].
     observation_time : float, optional
         Time after the push [s]. A fall is noticed only if it happens within this time.
-    initial_force : float, optional
-        First push to try, by default the robot's weight [N]. The push is doubled as long as it is
-        survived.
     resolution : float, optional
-        Spacing of the pushes to try [N]: all pushes are multiples of it.
+        Spacing of the pushes to try [N]: all pushes are multiples of it. The first one is the
+        robot's weight, and it is doubled as long as it is survived.
     workers : int, optional
         Number of processes, as for `fb.sweep`; each direction is a point of the sweep.
     cluster : distributed.Client or str, optional
@@ -216,8 +213,7 @@ def push_recovery(
         "observation_time": as_positive("observation_time", observation_time, "s"),
         "resolution": as_positive("resolution", resolution, "N"),
     }
-    initial_force = robot.weight if initial_force is None else initial_force
-    first = ceil(as_positive("initial_force", initial_force, "N") / resolution)
+    first = ceil(robot.weight / resolution)
 
     def largest_push(direction: float) -> float:  # the progress bar shows this name
         return _largest_survived(direction, make, frame, first, **settings)

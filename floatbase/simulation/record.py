@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -320,20 +320,20 @@ class Recorder:
         self._n_steps += 1
 
     def complete_tick(
-        self,
-        tau_desired: Array,
-        stance: Contacts,
-        planned: Array | None,
-        planned_qdd: Array | None = None,
-        targets: tuple[Array, Mapping[str, slice]] | None = None,
-        joint_limits: JointLimits | None = None,
+        self, tau_desired: Array, stance: Contacts, planned: Array | None, command: Any = None
     ) -> None:
         """Complete the row of a control step."""
         n = self._n
-        if targets is not None:
-            self._targets.append((n, *targets))
-        if planned_qdd is not None:
-            self._planned_qdd[n], self._joint_limits = planned_qdd, joint_limits
+        # what only a `Command` has, or an answer like it
+        targets, entries, qdd, limits = (
+            getattr(command, name, None)
+            for name in ("target_values", "target_entries", "qdd", "joint_limits")
+        )
+        if type(targets) is np.ndarray and isinstance(entries, Mapping):
+            self._targets.append((n, targets, entries))
+        if type(qdd) is np.ndarray and qdd.dtype.char == "d" and qdd.shape == self._v.shape[1:]:
+            self._planned_qdd[n] = qdd
+            self._joint_limits = limits if isinstance(limits, JointLimits) else None
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
         if planned is not None:
@@ -453,8 +453,4 @@ class Recorder:
                     positions = lowest[:, points].mean(axis=1, keepdims=True)
             all_forces.append(forces)
             all_positions.append(positions)
-        forces, positions = (
-            np.concatenate(all_forces, axis=1),
-            np.concatenate(all_positions, axis=1),
-        )
-        return read_only(forces), read_only(positions)
+        return read_only(np.concatenate(all_forces, 1)), read_only(np.concatenate(all_positions, 1))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +19,6 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts
 from floatbase.errors import FloatbaseError, InputError, SimulationWarning, warn
 from floatbase.simulation.after_fall import record_settling
@@ -185,11 +184,7 @@ def rollout(
                 _run_substeps(sim, desired, substeps, pushes, actuators, record)
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
-            accelerations = _planned_accelerations(sim, command)
-            limits = getattr(command, "joint_limits", None)
-            known = limits if isinstance(limits, JointLimits) else None
-            targets = _targets(command)
-            record.complete_tick(desired, stance, planned, accelerations, targets, known)
+            record.complete_tick(desired, stance, planned, command)
             if sim.diverged:
                 return record.to_rollout(pushes, "diverged")
             if sim.fallen:
@@ -357,19 +352,3 @@ def _planned_forces(command: Any, stance: Contacts) -> Array | None:
             f"attribute contacts."
         )
     return planned
-
-
-def _targets(command: Any) -> tuple[Array, Mapping[str, slice]] | None:
-    """Return a command's targets and the entries of each task, or None if it has none."""
-    values = getattr(command, "target_values", None)
-    entries = getattr(command, "target_entries", None)
-    if type(values) is np.ndarray and isinstance(entries, Mapping):
-        return values, entries
-    return None
-
-
-def _planned_accelerations(sim: Simulation, command: Any) -> Array | None:
-    """Return a command's accelerations, shape (nv,) [m/s² or rad/s²], or None if it has none."""
-    qdd = getattr(command, "qdd", None)
-    is_vector = type(qdd) is np.ndarray and qdd.dtype.char == "d" and qdd.shape == (sim.robot.nv,)
-    return qdd if is_vector else None

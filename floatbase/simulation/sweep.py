@@ -344,24 +344,18 @@ class _Failure:
     @staticmethod
     def of(error: BaseException) -> _Failure:
         """Pickle an exception, if what is loaded again has its type and its text."""
-        text, kind = _one_line(error), type(error)
-        note = f"in a worker:\n{''.join(traceback.format_exception(error))}"
-        as_made = partial(kind.__new__, kind, *error.args)  # its __init__ may want other arguments
-        forms: list[tuple[Any, Row]] = [(error, {}), (as_made, vars(error)), (as_made, {})]
-        for form in forms:
-            with suppress(BaseException):  # user code may raise anything
-                failure = _Failure(require("cloudpickle", "sweep").dumps(form), text, note)
-                found = failure.exception()
-                if type(found) is kind and _one_line(found) == text:
-                    return failure
+        text, note = _one_line(error), f"in a worker:\n{''.join(traceback.format_exception(error))}"
+        with suppress(BaseException):  # user code may raise anything
+            failure = _Failure(require("cloudpickle", "sweep").dumps(error), text, note)
+            found = failure.exception()
+            if type(found) is type(error) and _one_line(found) == text:
+                return failure
         return _Failure(b"", text, note)
 
     def exception(self) -> BaseException:
         """Return the exception, or a `SimulationError` with its text if it cannot be loaded."""
         try:
-            made, attributes = pickle.loads(self.pickled)
-            error = made if isinstance(made, BaseException) else made()
-            error.__dict__.update(attributes)
+            error: BaseException = pickle.loads(self.pickled)
         except Exception:
             error = SimulationError(self.text)
         if not isinstance(error, InputError):

@@ -2,8 +2,6 @@
 integrator.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges

@@ -2,8 +2,6 @@
 a rollout.
 """
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest

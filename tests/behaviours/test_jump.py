@@ -1,7 +1,5 @@
 """`Jump`: its plan, its flight and its landing, and jumps that motors cannot do."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import judges

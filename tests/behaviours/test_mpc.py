@@ -1,7 +1,5 @@
 """`HorizonQP` and `MPC`: the quadratic program, its predictions, and walks with flight."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

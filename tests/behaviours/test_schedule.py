@@ -1,7 +1,5 @@
 """Gaits, swings, the pendulum and footholds against finite differences and closed forms."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

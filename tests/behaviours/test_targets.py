@@ -4,8 +4,6 @@ A walk on the reference backend evaluates the functions. Both walks see the same
 with pushes, turns, changes of stance, known slopes, and a body that is lowered and pitched.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Walking on a ground that the walk knows: footholds, soles and the lean of the body."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest

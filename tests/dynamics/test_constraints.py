@@ -4,8 +4,6 @@ wheels.
 Closed-form solutions and numerical integration give the expected results.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import judges

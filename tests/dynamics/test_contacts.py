@@ -1,7 +1,5 @@
 """Contacts: Jacobians against MuJoCo, drifts by finite differences, names, selection, stacking."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import judges

@@ -3,8 +3,6 @@
 MuJoCo and Pinocchio's recursive algorithm give the expected results.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges

@@ -3,8 +3,6 @@
 MuJoCo without gravity, finite differences and the energy give the expected results.
 """
 
-from __future__ import annotations
-
 import judges
 import mujoco
 import numpy as np

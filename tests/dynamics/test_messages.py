@@ -1,7 +1,5 @@
 """Errors of contacts and equations of motion: their types, and the names and numbers in them."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest
@@ -9,6 +7,7 @@ from messages import refused
 
 import floatbase as fb
 from floatbase.dynamics import (
+    EquationsOfMotion,
     FlatFootContact,
     LinearConstraint,
     PointContact,
@@ -26,11 +25,11 @@ STATE = GO2.standing()
 X, UP = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
-def eom(contacts: object = ALL, state: object = STATE) -> fb.EquationsOfMotion:
+def eom(contacts: object = ALL, state: object = STATE) -> EquationsOfMotion:
     return fb.equations_of_motion(state, contacts)
 
 
-def constrained(A: np.ndarray, b: np.ndarray) -> fb.EquationsOfMotion:
+def constrained(A: np.ndarray, b: np.ndarray) -> EquationsOfMotion:
     return eom(fb.Contacts([LinearConstraint("bad", 2, lambda state, t: (A, b))]))
 
 
@@ -44,7 +43,6 @@ def wheel(**wrong: object) -> RollingWheel:
         (lambda: fb.Contacts.points("go2"), "robot", "Robot"),
         (lambda: fb.Contacts.points(UR5), "ur5", "frames"),
         (lambda: fb.Contacts.points(GO2, mu=0.0), "mu", "FL_foot", 0),
-        (lambda: fb.Contacts.points(GO2, mu=-0.5), "mu", "FL_foot", -0.5),
         (lambda: fb.Contacts.points(GO2, mu=np.nan), "mu", "FL_foot", np.nan),
         (lambda: fb.Contacts.points(GO2, mu=None), "mu", "FL_foot", "None"),
         (lambda: fb.Contacts.points(GO2, mu=[0.7, 0.7]), "mu", 2, 4),
@@ -76,11 +74,7 @@ def wheel(**wrong: object) -> RollingWheel:
         (lambda: eom(fb.Contacts([moving_frame("base", lambda t: np.zeros(2))])), 2, 3),
         (lambda: wheel(axis=[0, 0, 0]), "axis", "disc"),
         (lambda: wheel(radius=0.0), "radius", "disc", 0),
-        (lambda: wheel(radius=-1.0), "radius", "disc", -1),
         (lambda: wheel(mu=0.0), "mu", "disc", 0),
-        (lambda: wheel(normal=[0, np.nan, 0]), "normal", "disc", np.nan),
-        (lambda: eom(state=GO2), "state", "State"),
-        (lambda: eom([1]), "contacts", "Contacts"),
         (lambda: eom().acceleration(np.zeros(3), np.zeros(12)), "tau", 3, 12),
         (lambda: eom().acceleration(np.zeros(12), np.zeros(3)), "forces", 3, 12),
         (lambda: eom().acceleration(np.zeros(12), np.zeros((3, 4))), "forces", 3, 4, 12),

@@ -4,8 +4,6 @@ Ranks come from MuJoCo's matrices and elimination with complete pivoting. Forces
 squares of the whole system and from MuJoCo's contacts.
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Data that authors of lessons write: metadata of questions, and tables in TOML files."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The engine of the page with a live robot repeats the Python library."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

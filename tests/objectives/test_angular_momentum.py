@@ -1,7 +1,5 @@
 """The angular momentum task, against finite differences of Pinocchio's centroidal momentum."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pinocchio as pin

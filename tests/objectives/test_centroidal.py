@@ -1,7 +1,5 @@
 """Centroidal dynamics, eqs. (20)-(25), against momentum from MuJoCo and Pinocchio, and cvxpy."""
 
-from __future__ import annotations
-
 import cvxpy as cp
 import judges
 import mujoco
@@ -311,9 +309,7 @@ NONE = np.zeros(3)
         (lambda: objectives.tangential_bias(MIXED), "bolts of base"),
         (lambda: objectives.force_bias(MIXED, 1.0, 0.0), "bolts of base"),
         (lambda: objectives.normal_bias(FEET, [1.0, 2.0, 3.0]), "a", 3, 4),
-        (lambda: objectives.normal_bias(FEET, np.nan), "a", np.nan),
         (lambda: objectives.normal_bias(FEET, [1.0, np.inf, 0.0, 0.0]), "a", np.inf),
-        (lambda: objectives.normal_bias(FEET, "much"), "a", "much"),
         (lambda: objectives.force_bias(FEET, -1.0, 10.0), "alpha", -1),
         (lambda: objectives.wrench_objective(STATE, FEET, [1.0, 2.0], np.zeros(3)), "force", 2, 3),
         (lambda: objectives.desired_wrench(STATE, [0.0, 0.0]), "com_acceleration", 2, 3),

@@ -3,8 +3,6 @@
 The finite differences use only positions from Pinocchio's forward kinematics.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import judges

@@ -1,7 +1,5 @@
 """Pullbacks of costs, eqs. (15), (18), (19), against direct minimization over all of (q̈, τ, λ)."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pytest

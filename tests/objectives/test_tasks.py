@@ -1,7 +1,5 @@
 """Tasks: residuals are actual - desired acceleration, by finite differences of motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

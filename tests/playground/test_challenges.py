@@ -1,7 +1,5 @@
 """Challenges have solutions, are not won by waiting, and notice changes of locked settings."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import judges

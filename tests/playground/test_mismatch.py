@@ -1,7 +1,5 @@
 """Model mismatch, compared with Pinocchio's dynamics of another model and with the plan."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 import pinocchio as pin
@@ -9,6 +7,7 @@ import pytest
 from messages import raises
 
 import floatbase as fb
+from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.playground import ModelMismatch
 from floatbase.qp import solve
@@ -23,7 +22,7 @@ def moving(seed: int = 3) -> fb.State:
 
 def solved(
     mismatch: ModelMismatch, state: fb.State, **options: object
-) -> tuple[fb.EquationsOfMotion, dict[str, np.ndarray]]:
+) -> tuple[EquationsOfMotion, dict[str, np.ndarray]]:
     robot, contacts = state.robot, judges.stance(state.robot)
     controller = fb.WholeBodyController(
         robot, contacts, fb.standing_tasks(robot.standing()), modify_qp=mismatch, **options

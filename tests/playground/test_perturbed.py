@@ -1,7 +1,5 @@
 """Perturbed physics, compared with Newton's law for the whole robot and with closed forms."""
 
-from __future__ import annotations
-
 import copy
 
 import judges

@@ -1,7 +1,5 @@
 """The program that the playground shows makes the same robot as the playground runs."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from dataclasses import replace
 from itertools import cycle

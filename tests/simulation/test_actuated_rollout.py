@@ -3,8 +3,6 @@
 The actuators are those of App. B.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cache
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Conversion of states and models between our convention and MuJoCo's."""
 
-from __future__ import annotations
-
 import ast
 import re
 

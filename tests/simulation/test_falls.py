@@ -3,8 +3,6 @@
 A live run shows them to the end.
 """
 
-from __future__ import annotations
-
 import copy
 import pickle
 import threading

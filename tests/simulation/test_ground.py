@@ -1,7 +1,5 @@
 """Ground with boxes: its surface, its contacts in MuJoCo, and robots that start on it."""
 
-from __future__ import annotations
-
 import judges
 import mujoco
 import numpy as np

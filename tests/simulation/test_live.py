@@ -1,7 +1,5 @@
 """Runs in the background: they continue, take pushes, and report why they stopped."""
 
-from __future__ import annotations
-
 import copy
 import threading
 from collections.abc import Iterator
@@ -15,6 +13,7 @@ from numpy.testing import assert_allclose
 from waiting import until
 
 import floatbase as fb
+from floatbase.control import Command
 from floatbase.errors import SimulationError
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer import PUSH_DISPLAY_TIME
@@ -61,7 +60,7 @@ def test_it_runs_pauses_and_goes_on_where_it_was(run, slices):
 def test_an_error_in_a_controller_is_reported_and_the_run_can_go_on_with_another(
     run, slices, error
 ):
-    def broken(q: np.ndarray, v: np.ndarray, t: float) -> fb.Command:
+    def broken(q: np.ndarray, v: np.ndarray, t: float) -> Command:
         raise error
 
     run.set_controller(broken)

@@ -1,7 +1,5 @@
 """Controllers with a noisy, late or user-defined observation of the state."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from types import SimpleNamespace
@@ -121,9 +119,7 @@ def test_the_wrapper_has_the_attributes_of_the_controller_but_not_its_methods():
 def test_observers_that_cannot_be_are_refused():
     robot = judges.load("go2")
     for make, number in (
-        (lambda: Observed(3.0), "3.0"),
         (lambda: Observed(judges.limp, lambda q, v: (q, v)), "observer 0"),
-        (lambda: SensorNoise("go2"), "go2"),
         (lambda: SensorNoise(robot, joint_velocity=-1.0), "-1"),
         (lambda: SensorNoise(robot, seed=-1), "-1"),
         (lambda: Latency(q=-0.1), "-0.1"),

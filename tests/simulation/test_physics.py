@@ -1,7 +1,5 @@
 """Gravity, pushes, motors, ground and measured forces obey Newton's laws."""
 
-from __future__ import annotations
-
 import copy
 
 import judges
@@ -120,18 +118,6 @@ def test_a_horizontal_push_has_its_magnitude_and_direction(force, towards, direc
     assert (push.start, push.duration, push.frame) == (0.2, 0.3, "FL_foot")
 
 
-@pytest.mark.parametrize("force", [[30.0, 0.0, 0.0], [0.0, -20.0, 10.0]])
-def test_a_push_gives_the_momentum_force_times_time(name, force):
-    sim = fb.Simulation(judges.load(name))
-    start = flying(name)
-    sim.reset(start)
-    push = fb.Push(force, start=0.02, duration=0.05)
-    for _ in range(100):
-        sim.step(np.zeros(sim.robot.d), (push,))
-    gained = sim.robot.mass * (sim.state.com_velocity - 0.1 * G)
-    assert np.allclose(gained, 0.05 * np.array(force), rtol=1e-2, atol=2e-2)
-
-
 def test_a_push_acts_in_its_own_steps_and_no_others():
     sim = fb.Simulation(judges.load("go2"))
     sim.reset(flying("go2"))
@@ -178,41 +164,18 @@ def test_a_push_at_a_frame_turns_the_robot_about_its_centre_of_mass(name):
         assert np.allclose(gained, expected, atol=2e-2 * np.linalg.norm(expected)), frame
 
 
-def test_pushes_add_up():
-    sim = fb.Simulation(judges.load("go2"))
-    force = np.array([10.0, 5.0, 0.0])
-    speeds = []
-    for pushes in ((fb.Push(force), fb.Push(force)), (fb.Push(2.0 * force),)):
-        sim.reset(flying("go2"))
-        for _ in range(10):
-            sim.step(np.zeros(12), pushes)
-        speeds.append(sim.v)
-    assert np.allclose(speeds[0], speeds[1], atol=1e-12)
-
-
-def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name):
+def test_torques_beyond_a_motors_limit_are_cut_at_the_limit(name, tmp_path, monkeypatch):
+    """MuJoCo drops all controls if one without a limit exceeds 1e10, so limits must come first."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log to the working directory
     robot = judges.load(name)
-    sims = [fb.Simulation(robot) for _ in range(3)]
+    sims = [fb.Simulation(robot) for _ in range(4)]
     signs = np.where(np.arange(robot.d) % 2, 1.0, -1.0)
-    for sim, part in zip(sims, (1.0, 7.0, 0.5), strict=True):
+    for sim, part in zip(sims, (1.0, 7.0, 0.5, 1e12), strict=True):
         sim.reset(flying(name))
         for _ in range(3):
             sim.step(part * signs * robot.torque_limits)
-    assert np.array_equal(sims[0].v, sims[1].v)
+    assert np.array_equal(sims[0].v, sims[1].v) and np.array_equal(sims[0].v, sims[3].v)
     assert not np.allclose(sims[0].v, sims[2].v)
-
-
-def test_absurd_torques_are_cut_at_the_limit_too(tmp_path, monkeypatch):
-    """MuJoCo drops all controls if one without a limit exceeds 1e10, so limits must come first."""
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log to the working directory
-    robot = judges.load("go2")
-    speeds = []
-    for size in (1.0, 1e12):
-        sim = fb.Simulation(robot)
-        sim.reset(flying("go2"))
-        sim.step(size * robot.torque_limits)
-        speeds.append(sim.v)
-    assert np.array_equal(speeds[0], speeds[1])
 
 
 def test_each_motor_turns_its_own_joint(name):

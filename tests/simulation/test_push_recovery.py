@@ -1,7 +1,5 @@
 """Push recovery: the bisection, its symmetry, and the theoretical bounds by other methods."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Closed loop: robots stand in MuJoCo under our controller and recover from pushes."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import judges

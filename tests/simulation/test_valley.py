@@ -1,7 +1,5 @@
 """Ground of several planes: robots stand in a valley, and on planes with an offset."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import judges

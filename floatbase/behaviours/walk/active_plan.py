@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
 from typing import Any, cast
@@ -28,6 +28,7 @@ from floatbase.behaviours.walk.targets import (
 from floatbase.control.tick import announce_if_slow
 
 
+@dataclass(eq=False)
 class ActivePlan:
     """A plan in use: the path and the ends of its swings move from one control step to the next.
 
@@ -35,38 +36,27 @@ class ActivePlan:
     compiled function writes the same numbers.
     """
 
-    def __init__(
-        self,
-        posture: WalkingPosture,
-        plan: StepPlan,
-        desired: DesiredMotion,
-        pose: BodyPose,
-        reach: float,
-        entries: Mapping[str, slice],
-        adjustment: Adjustment | None = None,
-        compiled: bool = True,
-    ):
-        self.plan = plan
-        self._posture = posture
-        self._desired = desired
-        self._pose = pose
-        self._reach = reach
-        self._entries = entries
-        self._adjustment = adjustment
+    posture: WalkingPosture
+    plan: StepPlan
+    desired: DesiredMotion
+    pose: BodyPose
+    reach: float
+    entries: Mapping[str, slice]
+    adjustment: Adjustment | None = None
+    compiled: bool = True
+
+    def __post_init__(self) -> None:
+        plan = self.plan
         self._path, self._swings = plan.path, plan.swings
-        usual = adjustment is None and all(type(path) is Swing for path in self._swings.values())
-        usual = usual and type(plan.plan) is LIPM and plan.plan.omega == posture.omega
-        self._numbers = _compiled_module() if compiled and usual else None
+        usual = type(plan.plan) is LIPM and plan.plan.omega == self.posture.omega
+        usual &= all(type(path) is Swing for path in self._swings.values())
+        usual &= self.compiled and self.adjustment is None
+        self._numbers = _compiled_module() if usual else None
         if self._numbers:
             self._write = self._numbers.write_targets
             self._body = self._pack_body(self._numbers)
             self._pieces = np.array(cast(LIPM, plan.plan).pieces)
             self._rows = self._pack_swings(self._numbers)
-
-    @property
-    def desired(self) -> DesiredMotion:
-        """The desired motion of the path."""
-        return self._desired
 
     @property
     def path(self) -> Path:
@@ -95,10 +85,7 @@ class ActivePlan:
         swings, planned = self.swings, self.plan.planned_swings
         moved = {foot: replace(swing, path=swings[foot]) for foot, swing in planned.items()}
         now = replace(self.plan, path=self.path, planned_swings=moved)
-        other = ActivePlan(
-            self._posture, now, desired, pose, self._reach, self._entries, self._adjustment,
-            self._numbers is not None,
-        )  # fmt: skip
+        other = replace(self, plan=now, desired=desired, pose=pose)
         other.plan = self.plan
         return other
 
@@ -111,10 +98,10 @@ class ActivePlan:
 
     def _write_reference(self, t: float, com: Array, com_velocity: Array, out: Array) -> None:
         """Write the targets by the functions that define them."""
-        posture, plan = self._posture, self.plan
-        path = self._path = self._path.moved(self._desired, t)
-        if self._adjustment is None:
-            ends = adjusted_ends(posture, self._reach, plan, path, com, com_velocity, t)
+        posture, plan = self.posture, self.plan
+        path = self._path = self._path.moved(self.desired, t)
+        if self.adjustment is None:
+            ends = adjusted_ends(posture, self.reach, plan, path, com, com_velocity, t)
         else:
             # copies, since users may keep them
             ends = self._user_ends(path, com.copy(), com_velocity.copy(), t)
@@ -123,8 +110,8 @@ class ActivePlan:
             for foot, swing in self._swings.items()
         }
         motions = {
-            "centre of mass": com_target(posture, self._pose, plan, t),
-            "orientation of base": base_target(posture, self._pose, path, t),
+            "centre of mass": com_target(posture, self.pose, plan, t),
+            "orientation of base": base_target(posture, self.pose, path, t),
         }
         for foot, swing in self._swings.items():
             motions[f"position of {foot}"] = swing(t)
@@ -133,27 +120,25 @@ class ActivePlan:
                     posture, foot, plan.planned_swings[foot], t
                 )
         for name, motion in motions.items():
-            out[self._entries[name]] = np.concatenate([np.ravel(part) for part in motion])
+            out[self.entries[name]] = np.concatenate([np.ravel(part) for part in motion])
 
     def _user_ends(self, path: Path, com: Array, com_velocity: Array, t: float) -> dict[str, Array]:
         """Return the ends of swings by the user-defined adjustment, each of shape (3,) [m]."""
-        assert self._adjustment is not None
+        assert self.adjustment is not None
         ends = {}
-        for foot, end in self._adjustment(self.plan, path, com, com_velocity, t).items():
+        for foot, end in self.adjustment(self.plan, path, com, com_velocity, t).items():
             position = as_array(f"the adjusted foothold of {foot}", end, (None,), "m")
             if foot in self._swings:
                 ground = self.plan.planned_swings[foot].ground
                 if len(position) == 2:
-                    position = self._posture.on_ground(foot, position, ground)
+                    position = self.posture.on_ground(foot, position, ground)
                 ends[foot] = as_array(f"the adjusted foothold of {foot}", position, (3,), "m")
         return ends
 
     def _pack_body(self, numbers: Any) -> Array:
         """Return the array `body` of `compiled_targets`."""
-        posture = self._posture
-        plan = self.plan
-        path = self._path
-        desired, lean = self._desired, self._pose.lean
+        posture, plan, path = self.posture, self.plan, self._path
+        desired, lean = self.desired, self.pose.lean
         body = np.zeros(numbers.BODY_SIZE)
         for first, values in (
             (numbers.TIME, (path.time, *path.position, path.yaw, *path.velocity)),
@@ -161,27 +146,27 @@ class ActivePlan:
             (numbers.LATER, desired.later),
             (numbers.FIRST_UNTIL, (desired.first_until, desired.begin)),
             (numbers.ACCELERATION, desired.acceleration),
-            (numbers.OMEGA, (posture.omega, posture.state.com[2] + self._pose.height)),
+            (numbers.OMEGA, (posture.omega, posture.state.com[2] + self.pose.height)),
             (numbers.GROUND, (*plan.ground.slope, plan.ground.level)),
-            (numbers.DEAD_ZONE, (dead_zone(posture, plan), self._reach, MIN_SIDE_FRACTION)),
-            (numbers.COM_ENTRY, (self._entries["centre of mass"].start,)),
-            (numbers.BASE_ENTRY, (self._entries["orientation of base"].start,)),
+            (numbers.DEAD_ZONE, (dead_zone(posture, plan), self.reach, MIN_SIDE_FRACTION)),
+            (numbers.COM_ENTRY, (self.entries["centre of mass"].start,)),
+            (numbers.BASE_ENTRY, (self.entries["orientation of base"].start,)),
             (numbers.BASE_ROTATION, posture.rotation("base").ravel()),
-            (numbers.PITCH, (self._pose.pitch + lean.goal, lean.begin, *lean.difference)),
+            (numbers.PITCH, (self.pose.pitch + lean.goal, lean.begin, *lean.difference)),
         ):
             body[first : first + len(values)] = values
         return body
 
     def _pack_swings(self, numbers: Any) -> Array:
         """Return the array `swings` of `compiled_targets`."""
-        posture = self._posture
+        posture = self.posture
         rows = np.zeros((len(self._swings), numbers.SWING_SIZE))
         for row, (foot, planned) in zip(rows, self.plan.planned_swings.items(), strict=True):
             path: Any = planned.path
             (yaw, last_yaw), (tilt, last_tilt) = planned.yaws, planned.tilts
             rotation = -1
             if foot in posture.flat_feet:
-                rotation = self._entries[f"orientation of {foot}"].start
+                rotation = self.entries[f"orientation of {foot}"].start
             for first, values in (
                 (numbers.START, path.start),
                 (numbers.PLANNED_END, planned.planned_end[:2]),
@@ -193,7 +178,7 @@ class ActivePlan:
                 (numbers.FIRST_TILT, tilt),
                 (numbers.TILT_CHANGE, last_tilt - tilt),
                 (numbers.FOOT_ROTATION, posture.rotation(foot).ravel()),
-                (numbers.POSITION_ENTRY, (self._entries[f"position of {foot}"].start, rotation)),
+                (numbers.POSITION_ENTRY, (self.entries[f"position of {foot}"].start, rotation)),
             ):
                 row[first : first + len(values)] = values
         return rows

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,13 @@ from floatbase.robots import State
 _DEFAULT_REACH, _DEFAULT_REACH_FLAT = 0.2, 0.3  # m
 _MAX_SPEED = 10.0  # m/s and rad/s: a larger number must be in another unit
 _MAX_ACCELERATION = 100.0  # m/s² and rad/s²: a larger number must be in another unit
+# of the options that are functions
+_USAGES = {
+    "foothold": "foothold(foot, touchdown, walk)",
+    "adjustment": "adjustment(plan, path, com, com_velocity, t)",
+    "modify_plan": "modify_plan(plan, state)",
+    "swing": "swing(start, end, lift_off, touchdown, clearance)",
+}
 
 
 def _as_gains(name: str, value: Any) -> tuple[float, float]:
@@ -106,53 +113,31 @@ class WalkOptions:
     controller: Mapping[str, Any]
 
     @staticmethod
-    def checked(
-        contacts: Contacts,
-        *,
-        clearance: float,
-        reach: float | None,
-        ramp: float,
-        foothold: Callable[..., npt.ArrayLike],
-        adjustment: Callable[..., Mapping[str, npt.ArrayLike]] | None,
-        modify_plan: Callable[[Any, State], Any] | None,
-        swing: Callable[..., SwingPath] | None,
-        ground: Terrain | None,
-        tasks: Sequence[Task],
-        acceleration: tuple[float, float],
-        gains: Gains | None,
-        controller: Mapping[str, Any],
-    ) -> WalkOptions:
+    def checked(contacts: Contacts, **options: Any) -> WalkOptions:
         """Return the options after checking them; None stands for a default."""
-        limits = as_array("acceleration", acceleration, (2,)).tolist()
+        for name, usage in _USAGES.items():
+            if options[name] is not None:
+                as_callable(name, options[name], usage)
+        if not isinstance(options["tasks"], list | tuple):
+            raise InputError(f"tasks must be a list of tasks, not {short_repr(options['tasks'])}.")
+        limits = as_array("acceleration", options["acceleration"], (2,)).tolist()
         forwards, turning = (
             as_positive("acceleration", limit, unit, maximum=_MAX_ACCELERATION)
             for limit, unit in zip(limits, ("m/s²", "rad/s²"), strict=True)
         )
-        if reach is None:
-            reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
-        if adjustment is not None:
-            example = "adjustment(plan, path, com, com_velocity, t)"
-            as_callable("adjustment", adjustment, example)
-        if modify_plan is not None:
-            as_callable("modify_plan", modify_plan, "modify_plan(plan, state)")
-        if not isinstance(tasks, list | tuple):
-            raise InputError(f"tasks must be a list of tasks, not {short_repr(tasks)}.")
-        example = "swing(start, end, lift_off, touchdown, clearance)"
-        if gains is None:
-            gains = Gains.for_contacts(contacts)
-        return WalkOptions(
-            clearance=as_positive("clearance", clearance, "m", allow_zero=True, maximum=1.0),
-            reach=as_positive("reach", reach, "m", maximum=1.0),
-            ramp=as_positive("ramp", ramp, "s", allow_zero=True, maximum=1.0),
-            foothold=as_callable("foothold", foothold, "foothold(foot, touchdown, walk)"),
-            adjustment=adjustment,
-            modify_plan=modify_plan,
-            swing=Swing if swing is None else as_callable("swing", swing, example),
-            ground=as_terrain("ground", ground),
-            tasks=tuple(tasks),
+        reach = _DEFAULT_REACH_FLAT if flat_foot_names(contacts) else _DEFAULT_REACH
+        defaults = {"reach": reach, "swing": Swing, "gains": Gains.for_contacts(contacts)}
+        given = {name: value for name, value in options.items() if value is not None}
+        checked = WalkOptions(**{**options, **defaults, **given})
+        return replace(
+            checked,
+            clearance=as_positive("clearance", checked.clearance, "m", True, maximum=1.0),
+            reach=as_positive("reach", checked.reach, "m", maximum=1.0),
+            ramp=as_positive("ramp", checked.ramp, "s", True, maximum=1.0),
+            ground=as_terrain("ground", checked.ground),
+            tasks=tuple(checked.tasks),
             acceleration=np.array([forwards, forwards, turning]),
-            gains=as_instance("gains", gains, Gains),
-            controller=controller,
+            gains=as_instance("gains", checked.gains, Gains),
         )
 
 

@@ -197,12 +197,9 @@ def make_plan(
         if previous and foot in (swings or {}) and foot not in stance:
             planned[foot] = replace(previous.planned_swings[foot], path=(swings or {})[foot])
         elif times:
-            yaws, start = (
-                _nearest_yaws(_foot_yaw(posture, state, foot), yaw_at(times[1])),
-                state.point(foot),
-            )
+            yaws = _nearest_yaws(_foot_yaw(posture, state, foot), yaw_at(times[1]))
             planned[foot] = _planned_swing(
-                posture, options, start, foot, footholds[foot], times, yaws
+                posture, options, state.point(foot), foot, footholds[foot], times, yaws
             )
     ramps, end = {}, interval[1] + TIME_TOLERANCE
     for foot in posture.contacts.names:

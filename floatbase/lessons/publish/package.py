@@ -19,11 +19,7 @@ from floatbase.errors import InputError
 from floatbase.lessons import assignment
 from floatbase.lessons.predictions import lesson_name
 from floatbase.lessons.publish.contents import title_of
-from floatbase.lessons.publish.workspace import (
-    NOTEBOOKS,
-    lesson_notebooks,
-    write_without_outputs,
-)
+from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks, write_without_outputs
 
 _ROOT = NOTEBOOKS.parent
 _INSTALL = ("pyproject.toml", "environment.txt", "README.md", "LICENSE", "CITATION.cff")

@@ -70,22 +70,8 @@ def picture(
 ) -> Picture:
     """Draw a push-recovery map on level ground around the robot, with rings for its scale.
 
-    Parameters
-    ----------
-    result : PushRecovery
-        Map to draw, as from `fb.push_recovery`.
-    scale : float, optional
-        Length of a drawn push [m/N]. By default, the widest curve is 1.5 times as wide as the
-        stance.
-    theory : bool, optional
-        Whether to draw the capture-point bound and the static bound as well.
-    previous : PushRecovery, optional
-        Map of another controller for comparison, in the same directions; it is drawn in grey.
-
-    Returns
-    -------
-    Picture
-        Items for `extra` of `Viewer.show`.
+    scale: length of a drawn push [m/N]; by default, the widest curve is 1.5 times as wide as the
+    stance. Other arguments are as for `plot`.
     """
     curves, feet = _curves(result, theory, previous), result.contacts.positions(result.state)
     middle = result.state.frame_pose(result.frame).translation

@@ -56,20 +56,7 @@ def plot_run(rollout: Rollout) -> Figure:
 
 
 def plot_com(rollout: Rollout, axis: Axes | None = None) -> Axes:
-    """Plot the displacement of the centre of mass since the start in x, y and z [mm].
-
-    Parameters
-    ----------
-    rollout : Rollout
-        Record to plot.
-    axis : Axes, optional
-        Axes to plot on. By default, a new figure.
-
-    Returns
-    -------
-    Axes
-        The axes.
-    """
+    """Plot the displacement of the centre of mass since the start in x, y and z [mm]."""
     as_rollout(rollout)
     axis = _axes_or_new(axis)
     moved = 1000.0 * (rollout.com - rollout.com[0])
@@ -82,18 +69,6 @@ def plot_forces(rollout: Rollout, axis: Axes | None = None) -> Axes:
     """Plot the measured normal force at each contact point [N].
 
     A wider line behind it shows the planned force.
-
-    Parameters
-    ----------
-    rollout : Rollout
-        Record to plot.
-    axis : Axes, optional
-        Axes to plot on. By default, a new figure.
-
-    Returns
-    -------
-    Axes
-        The axes.
     """
     as_rollout(rollout)
     axis = _axes_or_new(axis)
@@ -165,25 +140,10 @@ def plot_torques(rollout: Rollout, axis: Axes | None = None) -> Axes:
 
 
 def friction_used(rollout: Rollout, forces: Array) -> Array:
-    """Compute the used fraction of friction, ‖f_tangent‖ / (μ f_normal).
+    """Compute the used fraction of friction, ‖f_tangent‖ / (μ f_normal), shape (k / 3, n).
 
-    Parameters
-    ----------
-    rollout : Rollout
-        Record with n times and k / 3 contact points.
-    forces : ndarray, shape (n, k)
-        Contact forces in the world frame [N], such as `rollout.measured`.
-
-    Returns
-    -------
-    ndarray, shape (k / 3, n)
-        Fraction at each contact point and time, dimensionless; NaN where the point carries little
-        load.
-
-    Raises
-    ------
-    InputError
-        If the forces do not have the shape of `rollout.measured`.
+    forces: contact forces in the world frame, shape (n, k) [N], such as `rollout.measured`. The
+    result is NaN where a point carries little load.
     """
     as_rollout(rollout)
     found = numeric_copy(forces)  # NaN where no forces were planned

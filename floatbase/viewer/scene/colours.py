@@ -100,34 +100,10 @@ DARK_SHADES = {
 
 
 def hex_code(colour: RGB) -> str:
-    """Convert a colour to "#rrggbb".
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB, from 0 to 1.
-
-    Returns
-    -------
-    str
-        The colour as "#rrggbb".
-    """
+    """Convert a colour, RGB from 0 to 1, to "#rrggbb"."""
     return "#" + "".join(f"{round(255 * part):02X}" for part in colour)
 
 
 def with_alpha(colour: RGB, alpha: float) -> RGBA:
-    """Add an opacity to a colour.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB, from 0 to 1.
-    alpha : float
-        Opacity [-]: 0 is invisible, 1 is opaque.
-
-    Returns
-    -------
-    tuple of float
-        RGBA, from 0 to 1.
-    """
+    """Add an opacity, from 0 (invisible) to 1 (opaque), to a colour."""
     return (*colour, alpha)

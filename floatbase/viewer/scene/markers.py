@@ -45,26 +45,9 @@ def wrench(
     """Draw a force as a straight arrow and a moment as a curled arrow around its axis.
 
     The moment is drawn on top of the robot, which would otherwise hide it. A zero force or moment
-    is left out.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Point of application in the world frame [m].
-    force : array_like, shape (3,)
-        Force times the picture's scale, in the world frame [m].
-    moment : array_like, shape (3,)
-        Moment times the scale, divided by `size`, in the world frame [m]. The radius of the curled
-        arrow is the length of a force that has this moment at a lever arm of `size`.
-    size : float
-        Size of the robot [m].
-    colour : tuple of float, optional
-        RGB of both arrows.
-
-    Returns
-    -------
-    Picture
-        The arrows.
+    is left out. The force is times the picture's scale [m], and the moment is also divided by
+    `size`, the size of the robot [m]: the radius of the curled arrow is the length of a force that
+    has this moment at a lever arm of `size`.
     """
     picture: Picture = {}
     if np.linalg.norm(force) > 1e-6:
@@ -79,21 +62,7 @@ def curled_arrow(
 ) -> Item:
     """Draw an arrow that turns around an axis by the right-hand rule.
 
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Centre in the world frame [m].
-    moment : array_like, shape (3,)
-        Vector along the axis, in the world frame. Its length is the radius [m].
-    colour : tuple of float, optional
-        RGB.
-    on_top : bool, optional
-        Whether the arrow is drawn on top of objects in front of it.
-
-    Returns
-    -------
-    Item
-        The arrow.
+    The length of the moment is the radius [m]. With `on_top`, nothing in front hides the arrow.
     """
     moment, radius = vector_and_length("a curled arrow", moment)
     rotation = geometry.rotation_with_z_axis(moment / radius)
@@ -109,23 +78,8 @@ def push(
 ) -> Item:
     """Draw a push as an outlined arrow on top of the robot.
 
-    The arrow ends where the push acts.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Point where the push acts, in the world frame [m].
-    vector : array_like, shape (3,)
-        Vector from the tail to the tip of the arrow, in the world frame [m].
-    size : float
-        Size of the robot, which determines the width [m].
-    colour, outline : tuple of float, optional
-        RGB of the arrow and of its outline.
-
-    Returns
-    -------
-    Item
-        The arrow.
+    The arrow ends at `position`, where the push acts, and `vector` points from its tail to its tip,
+    both in the world frame [m]. `size`, the size of the robot [m], determines the width.
     """
     vector, length = vector_and_length("an arrow", vector)
     width = arrow_width(length, size)
@@ -140,21 +94,8 @@ def support_region(
 ) -> Picture:
     """Draw the support polygon: the convex hull of the contact points, seen from above.
 
-    Nothing is drawn for fewer than three points, or for points on a line.
-
-    Parameters
-    ----------
-    positions : array_like, shape (n, 3)
-        Contact points in the world frame [m].
-    height_above_ground : float
-        Distance of the polygon from the ground [m].
-    ground : Plane, Planes or Terrain, optional
-        Ground on which the corners lie.
-
-    Returns
-    -------
-    Picture
-        The polygon.
+    Nothing is drawn for fewer than three points, or for points on a line. The corners lie at a
+    distance `height_above_ground` [m] from the ground.
     """
     points = np.asarray(positions, dtype=np.float64)[:, :2]
     try:
@@ -174,30 +115,7 @@ def multiplier_labels(
 
     Multipliers have two significant digits. The label of a normal-force limit, which has no facet,
     is on the cone's axis at the top. Multipliers below a hundredth of the largest one have no
-    label.
-
-    Parameters
-    ----------
-    positions : array_like, shape (n, 3)
-        Contact points in the world frame [m].
-    contacts : Contacts
-        Contacts of the problem, with n points.
-    solution : Solution
-        Solution of a `QP` with a block of forces.
-    height : float
-        Height of the drawn cones [m].
-    size : float
-        Size of the robot, which determines the height of the letters [m].
-
-    Returns
-    -------
-    Picture
-        The labels.
-
-    Raises
-    ------
-    InputError
-        If the problem has no forces at these contacts.
+    label. height: that of the drawn cones [m]. size: size of the robot [m].
     """
     qp, found = solution.qp, solution.multipliers
     forces = qp.blocks.get("forces", slice(0, 0))
@@ -234,19 +152,7 @@ def multiplier_labels(
 def frame_axes(pose: npt.ArrayLike, length: float, name: str = "") -> Picture:
     """Draw the axes of a frame on top of the robot: x vermilion, y green, z blue.
 
-    Parameters
-    ----------
-    pose : array_like, shape (4, 4)
-        Homogeneous transform of the frame in the world.
-    length : float
-        Length of the axes [m].
-    name : str, optional
-        Text of a label; "" for none.
-
-    Returns
-    -------
-    Picture
-        The axes and the label.
+    pose: homogeneous transform of the frame in the world, shape (4, 4).
     """
     matrix = np.array(as_array("pose of a frame", pose, (4, 4)))
     matrix[:3, :3] *= as_positive("length of a frame's axes", length, "m")

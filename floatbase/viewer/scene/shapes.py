@@ -61,21 +61,7 @@ Picture = dict[str, Item]
 def with_normal_paths(picture: Picture) -> Picture:
     """Return the picture with normalized paths: "com/ball" instead of "/com//ball".
 
-    Parameters
-    ----------
-    picture : dict
-        Items, path -> item.
-
-    Returns
-    -------
-    Picture
-        The same items.
-
-    Raises
-    ------
-    InputError
-        If the picture is not a dictionary of items, or if a path has no name, because its matrix
-        would move the whole picture.
+    A path without a name is an `InputError`, because its matrix would move the whole picture.
     """
     normal = {}
     for path, item in as_instance("picture", picture, dict).items():
@@ -97,68 +83,22 @@ def _normal_path(path: str) -> str:
 
 
 def prefixed(path: str, items: Picture) -> Picture:
-    """Put items below a path.
-
-    Parameters
-    ----------
-    path : str
-        Prefix of each path.
-    items : dict
-        Items, path -> item.
-
-    Returns
-    -------
-    Picture
-        The same items with longer paths.
-
-    Raises
-    ------
-    InputError
-        If the path is not a string, or if `items` is not a dictionary.
-    """
+    """Put items, path -> item, below a path."""
     as_string("path", path)
     return {path + name: item for name, item in as_instance("items", items, dict).items()}
 
 
 def path_part(name: str) -> str:
-    """Return a name as one part of a path, without slashes.
-
-    Parameters
-    ----------
-    name : str
-        Name that may contain slashes.
-
-    Returns
-    -------
-    str
-        Name with underscores instead of slashes.
-    """
+    """Return a name as one part of a path, with underscores instead of slashes."""
     return name.replace("/", "_")
 
 
 def transform(
     position: npt.ArrayLike, rotation: npt.ArrayLike | None = None, scale: npt.ArrayLike = 1.0
 ) -> Array:
-    """Return the matrix that scales a shape, then rotates it, then places it.
+    """Return the matrix, (4, 4), that scales a shape, then rotates it, then places it [m].
 
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Position in the world frame [m].
-    rotation : array_like, shape (3, 3), optional
-        Rotation. By default, the identity.
-    scale : float or array_like, shape (3,), optional
-        Scale along the shape's own axes [-].
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        The matrix.
-
-    Raises
-    ------
-    InputError
-        If the position has the wrong shape, or if a number is not finite.
+    The scale is along the shape's own axes.
     """
     matrix = np.zeros((4, 4))
     matrix[:3, :3] = (_IDENTITY if rotation is None else np.asarray(rotation)) * np.asarray(scale)
@@ -178,27 +118,7 @@ def transform(
 
 
 def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
-    """Return a vector and its length.
-
-    Parameters
-    ----------
-    what : str
-        Name of the drawn object, for the message.
-    vector : array_like, shape (3,)
-        Vector [m].
-
-    Returns
-    -------
-    vector : ndarray, shape (3,)
-        The vector [m].
-    length : float
-        Length of the vector [m].
-
-    Raises
-    ------
-    InputError
-        If the vector is zero and therefore has no direction.
-    """
+    """Return a vector, shape (3,) [m], and its length; raise `InputError` if it is zero."""
     array = np.asarray(vector, dtype=np.float64)
     length = math.sqrt(array @ array) if array.shape == (3,) else 0.0
     if not 1e-12 < length < math.inf:
@@ -212,27 +132,11 @@ def vector_and_length(what: str, vector: npt.ArrayLike) -> tuple[Array, float]:
 def arrow(
     start: npt.ArrayLike, vector: npt.ArrayLike, colour: RGB, size: float = 1.0, halo: bool = False
 ) -> Item:
-    """Draw an arrow.
+    """Draw an arrow along a vector from its tail, `start`, both in the world frame [m].
 
-    Parameters
-    ----------
-    start : array_like, shape (3,)
-        Tail in the world frame [m].
-    vector : array_like, shape (3,)
-        Vector from tail to tip, in the world frame [m].
-    colour : tuple of float
-        RGB.
-    size : float, optional
-        Size of the robot [m]. The width of the shaft grows with the square roots of `size` and of
-        the arrow's length.
-    halo : bool, optional
-        Whether the arrow is wider and translucent, so that it is visible around another arrow at
-        the same place.
-
-    Returns
-    -------
-    Item
-        The arrow.
+    The width of the shaft grows with the square roots of `size`, the size of the robot [m], and of
+    the arrow's length. With a halo, the arrow is wider and translucent, so that it is visible
+    around another arrow at the same place.
     """
     vector, length = vector_and_length("an arrow", vector)
     width = arrow_width(length, size) * (1.8 if halo else 1.0)
@@ -244,20 +148,7 @@ def arrow(
 
 
 def arrow_width(length: float, size: float) -> float:
-    """Return the width of an arrow's shaft.
-
-    Parameters
-    ----------
-    length : float
-        Length of the arrow [m].
-    size : float
-        Size of the robot [m].
-
-    Returns
-    -------
-    float
-        Width [m].
-    """
+    """Return the width of an arrow's shaft [m] from its length and the size of the robot [m]."""
     return min(ARROW_SLENDERNESS * math.sqrt(length * ARROW_LENGTH * size), 0.35 * length)
 
 
@@ -295,18 +186,7 @@ def friction_cone(
 
 
 def cone_colour(status: str) -> RGBA:
-    """Return the colour of a friction cone.
-
-    Parameters
-    ----------
-    status : {"idle", "inside", "active", "outside"}
-        Status of its force, as for `friction_cone`.
-
-    Returns
-    -------
-    tuple of float
-        RGBA, from 0 to 1.
-    """
+    """Return the RGBA of a friction cone for the status of its force, as in `friction_cone`."""
     return with_alpha(CONE[status], CONE_ALPHA[status])
 
 
@@ -317,25 +197,9 @@ def friction_polyhedron(
     status: str,
     active: npt.ArrayLike = (),
 ) -> Picture:
-    """Draw the friction polyhedron that approximates a cone.
+    """Draw the friction polyhedron that approximates a cone; see `friction_cone`.
 
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Tip in the world frame [m].
-    polyhedron : FrictionPolyhedron
-        The polyhedron.
-    height : float
-        Height, as for `friction_cone` [m].
-    status : {"idle", "inside", "active", "outside"}
-        Status of the force, as for `friction_cone`.
-    active : array_like, shape (m,), optional
-        Indices of the facets that have the colour of an active constraint.
-
-    Returns
-    -------
-    Picture
-        The polyhedron and its active facets.
+    active: indices of the facets that have the colour of an active constraint.
     """
     as_positive("height of a friction polyhedron", height, "m")
     matrix = transform(position, _contact_axes(polyhedron.normal), height)
@@ -349,25 +213,10 @@ def friction_polyhedron(
 def cone_rim(
     position: npt.ArrayLike, polyhedron: FrictionPolyhedron, height: float, is_round: bool = False
 ) -> Item:
-    """Draw a dark rim around the mouth of a cone.
+    """Draw a dark rim around the mouth of a cone whose tip is at a position; see `friction_cone`.
 
-    The rim marks a force outside the cone, so that readers need not rely on colour alone.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Tip of the cone in the world frame [m].
-    polyhedron : FrictionPolyhedron
-        The polyhedron.
-    height : float
-        Height, as for `friction_cone` [m].
-    is_round : bool, optional
-        Whether the rim is that of the round cone with the polyhedron's normal and friction.
-
-    Returns
-    -------
-    Item
-        The rim.
+    The rim marks a force outside the cone, so that readers need not rely on colour alone. A round
+    rim is that of the cone with the polyhedron's normal and friction.
     """
     frame = _contact_axes(polyhedron.normal)
     if is_round:
@@ -378,22 +227,7 @@ def cone_rim(
 
 
 def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float) -> Item:
-    """Draw a disc at a contact.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Contact point in the world frame [m].
-    normal : array_like, shape (3,)
-        Unit normal in the world frame.
-    radius : float
-        Radius [m].
-
-    Returns
-    -------
-    Item
-        The disc.
-    """
+    """Draw a disc at a contact point with a unit normal, both in the world frame [m]."""
     as_positive("radius of a contact patch", radius, "m")
     scale = (radius, radius, 0.12 * radius)
     return Item(unit_shapes.disc(PATCH), transform(position, _contact_axes(normal), scale))
@@ -402,19 +236,7 @@ def contact_patch(position: npt.ArrayLike, normal: npt.ArrayLike, radius: float)
 def centre_of_mass(position: npt.ArrayLike, ground: float, size: float) -> Picture:
     """Draw a ball at the centre of mass, its projection on the ground, and a line between them.
 
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Centre of mass in the world frame [m].
-    ground : float
-        Height of the ground below it [m].
-    size : float
-        Size of the robot [m].
-
-    Returns
-    -------
-    Picture
-        The three items.
+    ground: height of the ground below it [m]. size: size of the robot [m].
     """
     x, y, z = np.asarray(position, dtype=np.float64)
     radius = 0.04 * size
@@ -435,25 +257,9 @@ def label(
     colour: RGB = (0.13, 0.13, 0.13),
     plate: bool = True,
 ) -> Item:
-    """Draw text that always faces the viewer.
+    """Draw text, with letters of this height [m], that always faces the viewer.
 
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Centre of the text in the world frame [m].
-    text : str
-        The text. Braces make a subscript: "f{c}".
-    height : float
-        Height of the letters [m].
-    colour : tuple of float, optional
-        RGB of the text.
-    plate : bool, optional
-        Whether a plate lies behind the text.
-
-    Returns
-    -------
-    Item
-        The label.
+    Braces make a subscript: "f{c}". A plate lies behind the text by default.
     """
     as_positive("height of a label's letters", height, "m")
     return Item(unit_shapes.label(text, height, plate, colour), transform(position))
@@ -462,26 +268,7 @@ def label(
 def scale_bar(
     position: npt.ArrayLike, force: float, length: float, size: float, colour: RGB
 ) -> Picture:
-    """Draw a bar along x that shows the drawn length of a force.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Start of the bar in the world frame [m].
-    force : float
-        Force on its label [N].
-    length : float
-        Drawn length of this force [m].
-    size : float
-        Size of the robot [m].
-    colour : tuple of float
-        RGB.
-
-    Returns
-    -------
-    Picture
-        The bar and its label.
-    """
+    """Draw a bar along x that shows the drawn length [m] of a force [N], which its label names."""
     start = np.asarray(position, dtype=np.float64)
     along = geometry.rotation_with_z_axis([1.0, 0.0, 0.0])
     thick = 0.012 * size
@@ -499,50 +286,13 @@ def scale_bar(
 def rod(
     start: npt.ArrayLike, rotation: npt.ArrayLike, length: float, radius: float, colour: RGB
 ) -> Item:
-    """Draw a rod.
-
-    Parameters
-    ----------
-    start : array_like, shape (3,)
-        End of the rod in the world frame [m].
-    rotation : array_like, shape (3, 3)
-        Rotation whose z axis is the direction of the rod.
-    length, radius : float
-        Length and radius [m].
-    colour : tuple of float
-        RGB.
-
-    Returns
-    -------
-    Item
-        The rod.
-    """
+    """Draw a rod from its end `start` [m] along the z axis of a rotation."""
     as_positive("length of a rod", length, "m")
     return Item(unit_shapes.cylinder(colour), transform(start, rotation, (radius, radius, length)))
 
 
 def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
-    """Make a flat convex polygon that is visible from both sides.
-
-    Parameters
-    ----------
-    corners : array_like, shape (n, 3)
-        Corners [m].
-    colour : tuple of float
-        RGB.
-    opacity : float
-        Opacity, from 0 to 1 [-].
-
-    Returns
-    -------
-    Shape
-        The polygon.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than three corners.
-    """
+    """Make a flat convex polygon of at least three corners [m], visible from both sides."""
     points = as_array("corners of a polygon", corners, (None, 3), "m")
     if len(points) < 3:
         raise InputError(f"A polygon needs at least three corners, not {len(points)}.")
@@ -550,56 +300,17 @@ def flat_polygon(corners: npt.ArrayLike, colour: RGB, opacity: float) -> Shape:
 
 
 def invisible_point(position: npt.ArrayLike) -> Item:
-    """Make an invisible object for the camera to follow.
-
-    Parameters
-    ----------
-    position : array_like, shape (3,)
-        Position in the world frame [m].
-
-    Returns
-    -------
-    Item
-        The object.
-    """
+    """Make an invisible object at a position [m] for the camera to follow."""
     return Item(unit_shapes.invisible_point(), transform(position))
 
 
 def ground_grid(colour: RGB, step: float = 0.25, half: float = 5.0) -> Item:
-    """Draw a square grid of lines on the plane z = 0.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        RGB.
-    step : float, optional
-        Distance between lines [m].
-    half : float, optional
-        Half the side of the grid [m].
-
-    Returns
-    -------
-    Item
-        The grid.
-    """
+    """Draw a square grid on the plane z = 0, with lines at a distance `step` [m]."""
     return Item(_grid(colour, step, half), np.eye(4))
 
 
 def grid_lines(step: float = 0.25, half: float = 5.0) -> Array:
-    """Return the line segments of `ground_grid`.
-
-    Parameters
-    ----------
-    step : float, optional
-        Distance between lines [m].
-    half : float, optional
-        Half the side of the grid [m].
-
-    Returns
-    -------
-    ndarray, shape (2 n, 3)
-        Start and end of each segment [m].
-    """
+    """Return start and end of each line segment of `ground_grid`, shape (2 n, 3) [m]."""
     at = np.arange(-half, half + step / 2, step)
     # each line in pieces of one step: software renderers drop lines that begin far behind the
     # camera

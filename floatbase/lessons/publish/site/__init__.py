@@ -7,11 +7,7 @@ Sphinx. The text of the pages is in the folder `docs`. Building the site needs t
 
 from floatbase.lessons.publish.site import lecture, mathml, recall
 from floatbase.lessons.publish.site.addresses import PACKAGES, exported
-from floatbase.lessons.publish.site.answers import (
-    exercise_form,
-    prediction_form,
-    results,
-)
+from floatbase.lessons.publish.site.answers import exercise_form, prediction_form, results
 from floatbase.lessons.publish.site.build import SITE, build, replace_site
 from floatbase.lessons.publish.site.outputs import prepare_lesson, run_lessons
 from floatbase.lessons.publish.site.references import add_links
