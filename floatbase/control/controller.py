@@ -56,6 +56,17 @@ class _Settings(NamedTuple):
     on_infeasible: OnInfeasible
 
 
+class _Step(NamedTuple):
+    """Arguments of one control step, and how to answer it."""
+
+    q: npt.ArrayLike
+    v: npt.ArrayLike
+    t: float
+    targets: Array | None
+    in_loop: bool  # whether the iterations of the reference backend are limited
+    must_answer: bool  # whether to raise an error instead of returning None
+
+
 class WholeBodyController:
     """Whole-body controller: one quadratic program per control step.
 
@@ -433,7 +444,7 @@ class WholeBodyController:
             If the QP has no solution, unless `on_infeasible` is "soften".
         """
         in_loop = self._settings.backend != "reference"
-        command = self._answer(q, v, t, targets, in_loop, must_answer=True)
+        command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
         assert command is not None
         return command
 
@@ -473,31 +484,19 @@ class WholeBodyController:
         The compiled backend decides in microseconds. States in which its last digits are lost, and
         problems without a compiled form, need the reference backend.
         """
-        return self._answer(q, v, t, targets, in_loop=True, must_answer=False)
+        return self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), True, False))
 
-    def _answer(
-        self,
-        q: npt.ArrayLike,
-        v: npt.ArrayLike,
-        t: float,
-        targets: npt.ArrayLike | None,
-        in_loop: bool,
-        must_answer: bool,
-    ) -> Command | None:
-        """Return the command of one control step, within milliseconds if `in_loop`.
-
-        If there is none, return None, or raise an error if `must_answer`.
-        """
-        t, array = self._checked_inputs(v, t, targets)
+    def _answer(self, step: _Step) -> Command | None:
+        """Return the command of this controller or of a softer one."""
         softer = self._softer_controllers
         if not softer:
-            return self._attempt(q, v, t, array, in_loop, must_answer)
+            return self._attempt(step)
         for controller in (self, *softer[:-1]):
             with suppress(SolverError):  # a softer problem may be easier
-                command = controller._attempt(q, v, t, array, in_loop)
+                command = controller._attempt(step._replace(must_answer=False))
                 if command is not None:
                     return command
-        return softer[-1]._attempt(q, v, t, array, in_loop, must_answer)
+        return softer[-1]._attempt(step)
 
     def _checked_inputs(
         self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
@@ -515,23 +514,16 @@ class WholeBodyController:
         self._layout.check_size(array)
         return t, array
 
-    def _attempt(
-        self,
-        q: npt.ArrayLike,
-        v: npt.ArrayLike,
-        t: float,
-        targets: Array | None,
-        in_loop: bool,
-        must_answer: bool = False,
-    ) -> Command | None:
-        """Return the command of this controller alone; without one, do as `_answer` does."""
+    def _attempt(self, step: _Step) -> Command | None:
+        """Return the command of this controller alone."""
+        q, v, t, targets, _, must_answer = step
         tick = self._compiled
         q_array, v_array = numeric_copy(q), numeric_copy(v)
         if tick is None or q_array is None or v_array is None:
-            return self._reference_attempt(q, v, t, targets, in_loop, must_answer)
+            return self._reference_attempt(step)
         answer = tick(q_array, v_array, t, targets)
         if answer is None or (must_answer and answer[1] == tick.infeasible):
-            return self._reference_attempt(q, v, t, targets, in_loop, must_answer)
+            return self._reference_attempt(step)
         result, n_active, inputs = answer
         if n_active == tick.infeasible:
             return None
@@ -553,16 +545,9 @@ class WholeBodyController:
             joint_limits=problem.limits.joint_limits,
         )
 
-    def _reference_attempt(
-        self,
-        q: npt.ArrayLike,
-        v: npt.ArrayLike,
-        t: float,
-        targets: Array | None,
-        in_loop: bool,
-        must_answer: bool,
-    ) -> Command | None:
-        """Return the reference backend's command; without one, do as `_answer` does."""
+    def _reference_attempt(self, step: _Step) -> Command | None:
+        """Return the reference backend's command."""
+        q, v, t, targets, in_loop, must_answer = step
         problem, values = self._problem, targets
         if targets is not None:
             problem = self._layout.fixed_problem(targets)

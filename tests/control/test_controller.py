@@ -414,9 +414,9 @@ def test_a_control_step_in_a_wild_state_ends_soon_and_names_what_answered(backen
 
 def test_a_conflict_that_is_read_later_survives_a_pickle():
     robot = judges.load("go2")
-    controller = judges.controller_of("go2", max_normal_force=1.0)
+    controller = judges.controller_of("go2", min_normal_force=500.0)
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, np.zeros(robot.nv))
     copied = pickle.loads(pickle.dumps(caught.value))
     assert copied.constraints == caught.value.constraints != ()
-    assert str(copied) == str(caught.value) and copied.constraints[0] in repr(copied)
+    assert str(copied) == str(caught.value) and repr(copied) == repr(caught.value)
