@@ -493,7 +493,7 @@ class WholeBodyController:
             return self._attempt(step)
         for controller in (self, *softer[:-1]):
             with suppress(SolverError):  # a softer problem may be easier
-                command = controller._attempt(step._replace(must_answer=False))
+                command = controller._attempt(_Step(*step[:-1], must_answer=False))
                 if command is not None:
                     return command
         return softer[-1]._attempt(step)

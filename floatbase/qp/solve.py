@@ -135,7 +135,7 @@ def solve_in_step(qp: QP, solver: str, budget: Budget) -> Solution:
         relaxed = qp.reduced.with_slacks()  # without equalities, whose elimination takes 1 ms
     found = _daqp(relaxed, polish=relaxed is qp, budget=budget)
     if found is None:
-        raise InfeasibleError(lambda: _explanation(relaxed))
+        raise InfeasibleError(lambda: _explanation(qp.with_slacks()))
     if relaxed is qp:
         return found
     multipliers = found.inequality_multipliers[: len(qp.G)]
