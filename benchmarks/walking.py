@@ -296,7 +296,7 @@ def step_time(name: str, gait: Callable[[fb.Robot], Gait], impulse: float) -> Ro
         times["walk"].append((middle - begin) / 1e3)
         times["bare"].append((time.thread_time_ns() - middle) / 1e3)
         swinging.append(bool(walk.swings))
-        softened += command.softened
+        softened += bool(command.softened)
         backends.add(command.backend)
         sim.advance(command.tau, (push,))
     walks, bares = np.array(times["walk"]), np.array(times["bare"])

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -47,17 +48,43 @@ class InfeasibleError(FloatbaseError):
 
     Parameters
     ----------
-    message : str
-        Message of the exception.
+    message : str or callable
+        Message of the exception, or a function that returns an `InfeasibleError`. It is called when
+        the message or the constraints are read, because the search for a conflict is slow.
     constraints : iterable of str, optional
         Names of constraints in conflict, kept as the attribute `constraints`. Solvers of QPs name a
         minimal set: if any one of them is removed, the others can be satisfied. Other constraints
         may be in conflict, too.
     """
 
-    def __init__(self, message: str, constraints: Iterable[str] = ()):
+    def __init__(
+        self, message: str | Callable[[], InfeasibleError], constraints: Iterable[str] = ()
+    ):
         super().__init__(message)
-        self.constraints = tuple(constraints)
+        self._constraints = tuple(constraints)
+
+    @property
+    def constraints(self) -> tuple[str, ...]:
+        """Names of constraints in conflict."""
+        self._explain()
+        return self._constraints
+
+    def _explain(self) -> None:
+        """Search for the conflict, if this has not been done."""
+        if callable(self.args[0]):
+            found = self.args[0]()
+            self.args, self._constraints = found.args, found.constraints
+
+    def __str__(self) -> str:
+        self._explain()
+        return super().__str__()
+
+    def __repr__(self) -> str:
+        self._explain()
+        return super().__repr__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.constraints)
 
 
 class SolverError(FloatbaseError):

@@ -57,6 +57,7 @@ STATE_WEIGHTS = (25.0, 25.0, 10.0, 2.0, 2.0, 50.0, 0.3, 0.3, 0.3, 0.5, 0.5, 0.3)
 THETA, COM, OMEGA, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 _PYRAMID = np.array([[1.0, 0, 0], [-1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0], [0, 0, -1.0], [0, 0, 1]])
 _NO_BOUND = -1e30  # DAQP treats this as no bound
+_MAX_ITERATIONS = 400  # some 4 ms; 600 wild states of quadrupeds needed at most 250
 _NO_INERTIA = "inertia must be symmetric and positive definite [kg·m²]."
 
 
@@ -171,7 +172,10 @@ class HorizonQP(Value):
 
             H, g, G, h = self._matrices(S, error)
             senses = np.zeros(len(h), dtype=np.int32)
-            u, _, exit_flag, _ = daqp.solve(H, g, G, h, np.full(len(h), _NO_BOUND), senses)
+            no_bounds = np.full(len(h), _NO_BOUND)
+            u, _, exit_flag, _ = daqp.solve(
+                H, g, G, h, no_bounds, senses, iter_limit=_MAX_ITERATIONS
+            )
             if exit_flag != 1:
                 raise SolverError(
                     f"DAQP did not solve a horizon of {len(stands)} intervals (exit flag "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -10,12 +11,13 @@ import numpy as np
 from floatbase._validation import Array
 from floatbase.affine import Affine
 from floatbase.dynamics import Block
-from floatbase.errors import InputError
+from floatbase.errors import InfeasibleError, InputError, SolverError
 from floatbase.linear_algebra import null_space
 from floatbase.objectives import Task
 from floatbase.qp import FEASIBILITY_TOLERANCE, QP, ConstraintLabel, Solution, solve
 from floatbase.qp._changed import changed
 from floatbase.qp._levels import in_residuals
+from floatbase.qp.solve import Budget, solve_in_step
 
 # A smaller multiplier may be a rounding error. The bounds are a fraction of the largest slope that
 # it balances, and a multiple of the slope that is left at the optimum.
@@ -62,10 +64,13 @@ def solve_levels(
     levels: Sequence[Sequence[Task]],
     costs: Sequence[Sequence[tuple[Block, float, Affine]]],
     solver: str,
+    budget: Budget | None = None,
 ) -> list[Solution]:
     """Solve the QP of each priority level, subject to the optima of the levels before.
 
-    `Solution.solver` names the fallback if the solver failed in this level or an earlier one.
+    `Solution.solver` names the fallback if the solver failed in this level or an earlier one. With
+    a budget, a level after the first that has no answer ends the list. The solver of the last
+    solution is then "level 1 of 3", for example.
 
     The optimum of a level has the same residuals wherever it is attained, because the cost is
     strictly convex in them. The next level therefore keeps the residuals, not the variables. An
@@ -80,7 +85,13 @@ def solve_levels(
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
         level = changed(qp, A=A, b=b, equality_names=names, h=h, penalties=penalties)
         change, T, rank = in_residuals(level, terms, free, x)
-        found = solve(change, solver)
+        try:
+            found = solve_in_step(change, solver, budget) if budget else solve(change, solver)
+        except (InfeasibleError, SolverError):
+            if budget is None or not solutions:
+                raise
+            named = f"level {len(solutions)} of {len(levels)}"
+            return [*solutions[:-1], replace(solutions[-1], solver=named)]
         x = x + T @ found.x
         before = solutions[-1].violations if solutions else {}
         # a fallback of an earlier level is reported in the later ones, too

@@ -33,10 +33,14 @@ class Command(Value):
         Contacts at which the forces act.
     backend : {"compiled", "reference"}
         Backend that computed the answer.
+    solver : str
+        Solver that found the answer: "compiled", or the solver of the reference backend. "daqp
+        unrefined" means that the last digits are lost. "level 1 of 3" means that the levels after
+        the first could not be solved within a control step.
     solution : Solution or callable
         Value of the property `solution`, or a function that computes it on first use.
-    softened : bool, optional
-        Whether limits, or limits and contacts, were made soft because the QP had no solution.
+    softened : tuple of str, optional
+        What was made soft because the QP had no solution: "limits", "contacts", or both.
     target_values : ndarray, shape (n,), optional
         Targets of all tasks in this control step, as `WholeBodyController.targets_at` returns them.
     target_entries : mapping of str to slice, optional
@@ -50,7 +54,8 @@ class Command(Value):
     forces: Array
     contacts: Contacts
     backend: str
-    softened: bool
+    solver: str
+    softened: tuple[str, ...]
     target_values: Array
     target_entries: Mapping[str, slice]
     joint_limits: JointLimits | None
@@ -63,8 +68,9 @@ class Command(Value):
         forces: Array,
         contacts: Contacts,
         backend: str,
+        solver: str,
         solution: Solution | Callable[[], Solution],
-        softened: bool = False,
+        softened: tuple[str, ...] = (),
         target_values: Array = _NO_TARGETS,
         target_entries: Mapping[str, slice] = _NO_ENTRIES,
         joint_limits: JointLimits | None = None,
@@ -76,6 +82,7 @@ class Command(Value):
         values["forces"] = forces
         values["contacts"] = contacts
         values["backend"] = backend
+        values["solver"] = solver
         values["_solution"] = solution
         values["softened"] = softened
         values["joint_limits"] = joint_limits

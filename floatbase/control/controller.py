@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple, TypeAlias, cast, get_args
@@ -38,7 +39,7 @@ from floatbase.control.tick import (
     unsupported_reason,
 )
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError, unknown_name
+from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
@@ -53,6 +54,17 @@ class _Settings(NamedTuple):
     solver: str
     backend: Backend
     on_infeasible: OnInfeasible
+
+
+class _Step(NamedTuple):
+    """Arguments of one control step, and how to answer it."""
+
+    q: npt.ArrayLike
+    v: npt.ArrayLike
+    t: float
+    targets: Array | None
+    in_loop: bool  # whether the iterations of the reference backend are limited
+    must_answer: bool  # whether to raise an error instead of returning None
 
 
 class WholeBodyController:
@@ -152,7 +164,14 @@ class WholeBodyController:
 
     The properties `backend` and `backend_reason` say which backend is in use and why. If the
     compiled backend finds no answer at a state, or none that is accurate to the last digits, the
-    reference backend takes over, and `Command.backend` is "reference".
+    reference backend takes over. `Command.backend` and `Command.solver` say what answered.
+
+    A control step takes a few milliseconds at most, because the iterations of both backends are
+    limited. Beyond the limit, a step of the reference backend ends with DAQP's unrefined result,
+    with the answer of the priority levels before, or with a `SolverError`. Softer controllers
+    follow with `on_infeasible="soften"`. The conflict that an `InfeasibleError` names is found when
+    its message is read. Only a call with `backend="reference"` has no limit, and may fall back to
+    the slow solver "active_set"; `attempt` is limited there, too.
 
     Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
     and in the standing posture. Functions and objects must therefore be defined at t = 0, even if a
@@ -169,7 +188,7 @@ class WholeBodyController:
     """
 
     __setattr__ = refuse_new_attributes
-    _softened = False  # whether this controller is another one's fallback for infeasible states
+    _softened: tuple[str, ...] = ()  # as in `Command`, if this is the fallback of another one
 
     def __init__(
         self,
@@ -250,9 +269,12 @@ class WholeBodyController:
             reason += f"; these terms run as Python beside it: {names}" if names else ""
         self._backend_reason = reason
 
-    def _with_problem(self, problem: Problem) -> WholeBodyController:
+    def _with_problem(
+        self, problem: Problem, softened: tuple[str, ...] = ()
+    ) -> WholeBodyController:
         """Return a controller of another problem with the same settings."""
         other = object.__new__(type(self))
+        other._softened = softened
         other._prepare(problem, self._settings, warm_up=self._compiled is None)
         return other
 
@@ -261,17 +283,16 @@ class WholeBodyController:
         """Make the controllers for infeasible states: soft limits, then soft contacts as well."""
         if self._settings.on_infeasible != "soften":
             return ()
-        problem, softer_problems = self._problem, []
+        problem, controllers = self._problem, list[WholeBodyController]()
+        softened: tuple[str, ...] = ()
         limits = problem.limits.softened(SOFT_LIMIT_WEIGHT)
         if limits is not problem.limits:
-            problem = replace(problem, limits=limits)
-            softer_problems.append(problem)
+            problem, softened = replace(problem, limits=limits), ("limits",)
+            controllers.append(self._with_problem(problem, softened))
         if contact_weight_of(problem.tasks) is None:
-            softer_problems.append(_softened(problem, SOFT_CONTACT_WEIGHT))
-        controllers = tuple(self._with_problem(softer) for softer in softer_problems)
-        for controller in controllers:
-            controller._softened = True
-        return controllers
+            problem = _softened(problem, SOFT_CONTACT_WEIGHT)
+            controllers.append(self._with_problem(problem, (*softened, "contacts")))
+        return tuple(controllers)
 
     def __getstate__(self) -> tuple[Problem, _Settings]:
         """Return the problem and the settings, for copies and pickles.
@@ -422,12 +443,10 @@ class WholeBodyController:
         InfeasibleError
             If the QP has no solution, unless `on_infeasible` is "soften".
         """
-        if self._compiled is not None or self._settings.on_infeasible == "soften":
-            command = self.attempt(q, v, t, targets)
-            if command is not None:
-                return command
-        softest = (self, *self._softer_controllers)[-1]
-        return softest._reference_command(q, v, *self._checked_inputs(v, t, targets))
+        in_loop = self._settings.backend != "reference"
+        command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
+        assert command is not None
+        return command
 
     def attempt(
         self,
@@ -438,9 +457,9 @@ class WholeBodyController:
     ) -> Command | None:
         """Compute the command of one control step, or return None if the QP has no solution.
 
-        Unlike a call, this method does not search for the conflicting constraints, which takes up
-        to 0.3 s. It is therefore suitable for real-time loops. A call with the same arguments gives
-        the reasons as an `InfeasibleError`.
+        A call raises an `InfeasibleError` instead. Unlike a call, this method does not let the
+        reference backend confirm that there is no solution, which takes milliseconds. It is
+        therefore suitable for real-time loops.
 
         Parameters
         ----------
@@ -465,11 +484,19 @@ class WholeBodyController:
         The compiled backend decides in microseconds. States in which its last digits are lost, and
         problems without a compiled form, need the reference backend.
         """
-        t, target_array = self._checked_inputs(v, t, targets)
-        for controller in (self, *self._softer_controllers):
-            if (command := controller._attempt(q, v, t, target_array)) is not None:
-                return command
-        return None
+        return self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), True, False))
+
+    def _answer(self, step: _Step) -> Command | None:
+        """Return the command of this controller or of a softer one."""
+        softer = self._softer_controllers
+        if not softer:
+            return self._attempt(step)
+        for controller in (self, *softer[:-1]):
+            with suppress(SolverError):  # a softer problem may be easier
+                command = controller._attempt(_Step(*step[:-1], must_answer=False))
+                if command is not None:
+                    return command
+        return softer[-1]._attempt(step)
 
     def _checked_inputs(
         self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
@@ -487,17 +514,16 @@ class WholeBodyController:
         self._layout.check_size(array)
         return t, array
 
-    def _attempt(
-        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
-    ) -> Command | None:
-        """Return the command of this controller alone, or None if there is no solution."""
+    def _attempt(self, step: _Step) -> Command | None:
+        """Return the command of this controller alone."""
+        q, v, t, targets, _, must_answer = step
         tick = self._compiled
         q_array, v_array = numeric_copy(q), numeric_copy(v)
         if tick is None or q_array is None or v_array is None:
-            return self._reference_attempt(q, v, t, targets)
+            return self._reference_attempt(step)
         answer = tick(q_array, v_array, t, targets)
-        if answer is None:
-            return self._reference_attempt(q, v, t, targets)
+        if answer is None or (must_answer and answer[1] == tick.infeasible):
+            return self._reference_attempt(step)
         result, n_active, inputs = answer
         if n_active == tick.infeasible:
             return None
@@ -511,6 +537,7 @@ class WholeBodyController:
             forces=result[tick.forces],
             contacts=problem.contacts,
             backend="compiled",
+            solver="compiled",
             solution=partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
             softened=self._softened,
             target_values=targets_of_tick,
@@ -518,23 +545,19 @@ class WholeBodyController:
             joint_limits=problem.limits.joint_limits,
         )
 
-    def _reference_attempt(
-        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
-    ) -> Command | None:
-        """Return the reference backend's command, or None if there is no solution."""
-        try:
-            return self._reference_command(q, v, t, targets)
-        except InfeasibleError:
-            return None
-
-    def _reference_command(
-        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: Array | None
-    ) -> Command:
+    def _reference_attempt(self, step: _Step) -> Command | None:
         """Return the reference backend's command."""
+        q, v, t, targets, in_loop, must_answer = step
         problem, values = self._problem, targets
         if targets is not None:
             problem = self._layout.fixed_problem(targets)
-        solution = problem.solve_levels(State(self.robot, q, v), t, self.solver)[-1]
+        state = State(self.robot, q, v)
+        try:
+            solution = problem.solve_levels(state, t, self.solver, in_loop)[-1]
+        except InfeasibleError:
+            if must_answer:
+                raise
+            return None
         if values is None:
             values = self._layout.at(t) if self._layout.varies else self._layout.constant
         return Command(
@@ -543,6 +566,7 @@ class WholeBodyController:
             forces=read_only(solution["forces"]),
             contacts=self.contacts,
             backend="reference",
+            solver=solution.solver,
             solution=solution,
             softened=self._softened,
             target_values=read_only(values),

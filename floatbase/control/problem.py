@@ -44,6 +44,7 @@ from floatbase.objectives import (
 )
 from floatbase.qp import QP, ConstraintLabel, Solution, solve
 from floatbase.qp._changed import changed
+from floatbase.qp.solve import Budget, solve_in_step
 from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 
@@ -186,7 +187,9 @@ class Problem(Value):
         return qp.with_slacks() if slacks else qp
 
     @one_blas_thread()
-    def solve_levels(self, state: State, t: float = 0.0, solver: str = "daqp") -> list[Solution]:
+    def solve_levels(
+        self, state: State, t: float = 0.0, solver: str = "daqp", in_loop: bool = False
+    ) -> list[Solution]:
         """Solve the QPs of all priority levels at a state and a time.
 
         Parameters
@@ -197,6 +200,9 @@ class Problem(Value):
             Time [s].
         solver : str, optional
             QP solver, one of `floatbase.qp.solvers()`.
+        in_loop : bool, optional
+            Whether to limit the iterations of "daqp" as in a control step, without a fallback. If a
+            level after the first has no answer then, it is missing from the list.
 
         Returns
         -------
@@ -212,7 +218,8 @@ class Problem(Value):
             If there is no solution.
         """
         if not self.level_sizes:
-            return [solve(self.qp(state, t, slacks=False), solver)]
+            qp = self.qp(state, t, slacks=False)
+            return [solve_in_step(qp, solver, Budget()) if in_loop else solve(qp, solver)]
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
         levels = self.levels
@@ -227,7 +234,7 @@ class Problem(Value):
         for terms in costs[1:]:
             H, g = _objective(terms, first.blocks, first.n)
             qps.append(changed(first, H=0.5 * (H + H.T), g=g))
-        return solve_levels(qps, levels, costs, solver)
+        return solve_levels(qps, levels, costs, solver, Budget() if in_loop else None)
 
     def _check_robot(self, state: State) -> None:
         """Raise `InputError` if a state belongs to a different robot."""

@@ -44,6 +44,23 @@ _PROXIMAL_WEIGHTS = -1e-6, 1e-5, 1e-4
 # DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
 # 4 s on a loaded machine, and it was never seen to need more than 155
 _DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
+UNREFINED = "daqp unrefined"  # DAQP's result if its last digits cannot be improved
+_WORK_PER_STEP = 1.6e7  # multiplications, some 3.5 ms
+
+
+class Budget:
+    """Work that DAQP may do in one control step; iterations are counted, so it is deterministic."""
+
+    def __init__(self, work: float = _WORK_PER_STEP) -> None:
+        self._work = work
+
+    def iterations(self, n: int, rows: int) -> int:
+        """Return how many iterations are left on a problem of this size."""
+        return min(_DAQP_ITERATIONS, int(self._work / (n * (n + rows))))
+
+    def spend(self, iterations: int, n: int, rows: int) -> None:
+        """Count iterations."""
+        self._work -= iterations * n * (n + rows)
 
 
 def solve(qp: QP, solver: str = "daqp") -> Solution:
@@ -81,20 +98,69 @@ def solve(qp: QP, solver: str = "daqp") -> Solution:
     "daqp" and "cvxpy" fall back to "active_set" if they find no point although no constraints are
     in conflict. "daqp" also does so if polishing its result fails, as with weights that are too far
     apart. The fallback takes 4 to 40 ms, and `Solution.solver` names it. It ends with `SolverError`
-    after 300 iterations, which take a few seconds for a humanoid.
+    after 300 iterations, which take a few seconds for a humanoid. Control loops do not fall back to
+    it: see the notes of `WholeBodyController`.
     """
     check_solver(solver)
     if len(as_instance("qp", qp, QP).soft):
         return _solve_soft(qp, solver)
     solution = _BACK_ENDS[solver](qp)
-    if solution is not None:
-        return solution
-    conflict = conflicting_constraints(
-        qp.reduced.G / qp.row_norms[:, None], qp.reduced.h / qp.row_norms
+    if solution is None:
+        conflict = _conflict(qp)
+        if conflict:
+            raise infeasible(conflict)
+        return _active_set(qp, max_iterations=_FALLBACK_ITERATIONS)
+    if solution.solver == UNREFINED:
+        space, mu = qp.equality_space, solution.inequality_multipliers
+        guess = [qp.inequality_names[i] for i in np.flatnonzero(mu)]
+        start = space.A.T @ (solution.x - space.b)
+        return _active_set(qp, start, guess, _FALLBACK_ITERATIONS)
+    return solution
+
+
+def solve_in_step(qp: QP, solver: str, budget: Budget) -> Solution:
+    """Solve a QP as `solve` does, but within the budget of a control step.
+
+    There is no fallback to `active_set`: a result of DAQP that cannot be polished is the solution.
+    The message of an `InfeasibleError` is found when it is read. Solvers other than "daqp", which
+    users have to request, have no budget.
+    """
+    if solver != "daqp":
+        return solve(qp, solver)
+    relaxed = qp
+    if len(qp.soft):
+        exact = _solve_with_known_violations(qp, np.zeros(len(qp.G), dtype=bool), solver, budget)
+        if exact is not None:
+            return exact
+        relaxed = qp.reduced.with_slacks()  # without equalities, whose elimination takes 1 ms
+    found = _daqp(relaxed, polish=relaxed is qp, budget=budget)
+    if found is None:
+        raise InfeasibleError(lambda: _explanation(qp.with_slacks()))
+    if relaxed is qp:
+        return found
+    multipliers = found.inequality_multipliers[: len(qp.G)]
+    x = qp.equality_space(found.x[: qp.reduced.n])
+    rough = Solution(qp, x, multipliers, UNREFINED, found.iterations)
+    return _solve_with_known_violations(qp, _violations(qp, rough), solver, budget) or rough
+
+
+def _explanation(qp: QP) -> InfeasibleError:
+    """Return the error of a problem in which DAQP found no point."""
+    with suppress(SolverError):
+        conflict = _conflict(qp)
+        if conflict:
+            return infeasible(conflict)
+    return InfeasibleError(
+        f"DAQP found no point that satisfies the constraints of {qp!r}, but no conflict was found, "
+        f"either. The weights are probably too far apart. floatbase.qp.solve searches longer."
     )
-    if conflict:
-        raise infeasible(qp.inequality_names[i] for i in conflict)
-    return _active_set(qp, max_iterations=_FALLBACK_ITERATIONS)
+
+
+def _conflict(qp: QP) -> list[str]:
+    """Return the names of a minimal set of conflicting inequalities, or an empty list."""
+    rows, norms = qp.reduced.G, qp.row_norms
+    conflict = conflicting_constraints(rows / norms[:, None], qp.reduced.h / norms)
+    return [qp.inequality_names[i] for i in conflict]
 
 
 def _solve_soft(qp: QP, solver: str) -> Solution:
@@ -132,7 +198,7 @@ def _violations(qp: QP, found: Solution) -> npt.NDArray[np.bool_]:
 
 
 def _solve_with_known_violations(
-    qp: QP, violated: npt.NDArray[np.bool_], solver: str
+    qp: QP, violated: npt.NDArray[np.bool_], solver: str, budget: Budget | None = None
 ) -> Solution | None:
     """Solve a problem with soft inequalities if these are the violated ones; otherwise return None.
 
@@ -147,8 +213,10 @@ def _solve_with_known_violations(
     )
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
         # without a search for the names of a conflict, which soft rows may resolve
-        found = _BACK_ENDS[solver](hard)
-        if found is not None and np.all(found.inequality_multipliers <= qp.penalties):
+        found = _daqp(hard, budget=budget) if solver == "daqp" else _BACK_ENDS[solver](hard)
+        if found is None or found.solver == UNREFINED:
+            return None
+        if np.all(found.inequality_multipliers <= qp.penalties):
             multipliers = penalties + sign * found.inequality_multipliers
             return Solution(qp, found.x, multipliers, found.solver, found.iterations)
     return None
@@ -186,12 +254,13 @@ def check_solver(solver: str) -> None:
         require("cvxpy", extra="cvxpy")
 
 
-def _daqp(qp: QP, polish: bool = True) -> Solution | None:
+def _daqp(qp: QP, polish: bool = True, budget: Budget | None = None) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
-    If polishing fails for all proximal weights, `active_set` continues from DAQP's first result.
-    Return None if weights are so far apart that DAQP does not converge. Also return None if DAQP
-    reports infeasibility, since it may mistake small curvature for it.
+    If polishing fails for all proximal weights, the solution is DAQP's first result, and its solver
+    is `UNREFINED`. Return None if DAQP reports infeasibility, since it may mistake small curvature
+    for it. Also return None if weights are so far apart that DAQP does not converge; with a budget,
+    this raises `SolverError`.
     """
     import daqp
 
@@ -200,8 +269,11 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
         only = _polished(qp, np.zeros(0), np.zeros(rows))
         return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
-    first: tuple[Array, Array] | None = None
+    first: Solution | None = None
+    limit = _DAQP_ITERATIONS
     for proximal_weight in _PROXIMAL_WEIGHTS:  # a negative one: only if curvature is missing
+        if budget is not None and (limit := budget.iterations(reduced.n, rows)) == 0:
+            break
         y, _, exit_flag, info = daqp.solve(
             reduced.H / scale,
             reduced.g / scale,
@@ -211,27 +283,36 @@ def _daqp(qp: QP, polish: bool = True) -> Solution | None:
             np.zeros(rows, dtype=np.int32),
             primal_tol=FEASIBILITY_TOLERANCE,
             eps_prox=proximal_weight,
-            iter_limit=_DAQP_ITERATIONS,
+            iter_limit=limit,
         )
+        count = int(info["iterations"])
+        if budget is not None:
+            budget.spend(count, reduced.n, rows)
         if exit_flag in (-2, -4):  # cycling, too many iterations
             continue
         if exit_flag not in (1, 2):
             break
         y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-        if not polish:
-            return Solution(qp, qp.equality_space(y), mu, "daqp", int(info["iterations"]))
-        polished = _polished(qp, y, mu)
+        polished = _polished(qp, y, mu) if polish else None
         if polished is not None:
-            return Solution(qp, *polished, "daqp", int(info["iterations"]))
-        first = first or (y, mu)
+            return Solution(qp, *polished, "daqp", count)
+        first = first or Solution(qp, qp.equality_space(y), mu, UNREFINED, count)
+        if not polish:
+            break
     if first is not None:
-        guess = [qp.inequality_names[i] for i in np.flatnonzero(first[1])]
-        return _active_set(qp, first[0], guess, _FALLBACK_ITERATIONS)
+        return first
+    if limit == 0 or exit_flag in (-2, -4):
+        if budget is None:
+            return None
+        raise SolverError(
+            f"DAQP found no optimum of {qp!r} within the iterations of one control step. Its "
+            f"weights are probably too far apart, or the robot's state is far from any that it can "
+            f"control."
+        )
     if exit_flag == -3:
         raise unbounded(qp)
     if exit_flag == -5:
         raise not_convex(qp, reduced.H)
-    # DAQP reports infeasibility, cycling or too many iterations; its numbers may have any size
     return None
 
 

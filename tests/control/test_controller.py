@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import re
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from time import process_time
@@ -15,7 +17,7 @@ from messages import raises
 
 import floatbase as fb
 from floatbase.control import JointLimits
-from floatbase.errors import InfeasibleError, UnknownNameError
+from floatbase.errors import InfeasibleError, SolverError, UnknownNameError
 from floatbase.qp import solve
 from floatbase.robots import State
 
@@ -389,3 +391,32 @@ def test_a_soft_problem_far_from_any_state_that_can_be_controlled_is_solved_quic
         seconds.append(process_time() - start)
         assert command.solution.residuals.equality < 1e-5
     assert min(seconds) < 0.25
+
+
+@pytest.mark.parametrize("backend", ["auto", "reference"])
+def test_a_control_step_in_a_wild_state_ends_soon_and_names_what_answered(backend):
+    """Levels whose soft joint limits are violated took 30 ms, and infeasible ones 0.3 s."""
+    robot = judges.load("g1")
+    state, contacts = robot.standing(), judges.stance(robot)
+    levels = [[fb.CoMTask(state.com)], [fb.OrientationTask("base")], [fb.PostureTask(state.q)]]
+    controller = fb.WholeBodyController(robot, contacts, levels, backend=backend)
+    seconds, answered = [], set()
+    for seed in range(6):
+        wild = robot.random_state(seed, spread=0.5)
+        start = process_time()
+        with suppress(SolverError):
+            command = controller.attempt(wild.q, 5.0 * wild.v)
+            answered.add(command and command.solver)
+        seconds.append(process_time() - start)
+    assert answered and "active_set" not in answered
+    assert np.median(seconds) < 0.1
+
+
+def test_a_conflict_that_is_read_later_survives_a_pickle():
+    robot = judges.load("go2")
+    controller = judges.controller_of("go2", min_normal_force=500.0)
+    with pytest.raises(InfeasibleError) as caught:
+        controller(robot.standing().q, np.zeros(robot.nv))
+    copied = pickle.loads(pickle.dumps(caught.value))
+    assert copied.constraints == caught.value.constraints != ()
+    assert str(copied) == str(caught.value) and repr(copied) == repr(caught.value)

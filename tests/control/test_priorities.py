@@ -14,8 +14,9 @@ from scipy.optimize import linprog, lsq_linear, nnls
 
 import floatbase as fb
 from floatbase.control import JointLimits, _priorities, build_qp
-from floatbase.errors import InfeasibleError, InputError
+from floatbase.errors import InfeasibleError, InputError, SolverError
 from floatbase.objectives import AngularMomentumTask, AxisTask
+from floatbase.qp.solve import Budget
 from floatbase.robots import Robot, State
 
 
@@ -249,8 +250,27 @@ def test_levels_of_a_pushed_humanoid_need_no_fallback(name):
 
 def test_a_fallback_in_the_first_level_is_reported_by_the_last(monkeypatch):
     robot = judges.load("go2")
-    state, solve = robot.standing(), _priorities.solve
+    state, solve = robot.standing(), _priorities.solve_in_step
     used = iter(["active_set", "daqp", "daqp"])
-    monkeypatch.setattr(_priorities, "solve", lambda qp, solver: solve(qp, next(used)))
+    monkeypatch.setattr(_priorities, "solve_in_step", lambda qp, _, b: solve(qp, next(used), b))
     controller = fb.WholeBodyController(robot, judges.stance(robot), levels_of(robot, state))
-    assert controller(state.q, state.v).solution.solver == "active_set"
+    assert controller(state.q, state.v).solver == "active_set"
+
+
+def test_a_level_without_an_answer_in_time_leaves_the_answer_of_the_levels_before(monkeypatch):
+    robot = judges.load("go2")
+    state, solve, left = robot.standing(), _priorities.solve_in_step, [1]
+
+    def fail_after_one_level(qp, solver, budget):
+        budget = budget if left.pop() else Budget(work=0.0)
+        left.append(0)
+        return solve(qp, solver, budget)
+
+    levels = levels_of(robot, state)
+    controller = fb.WholeBodyController(robot, judges.stance(robot), levels)
+    first = controller.problem.solve_levels(state)[0]
+    monkeypatch.setattr(_priorities, "solve_in_step", fail_after_one_level)
+    command = controller(state.q, state.v)
+    assert command.solver == "level 1 of 3" and np.allclose(command.tau, first["tau"], atol=1e-6)
+    with pytest.raises(SolverError):  # without a level before
+        controller(state.q, state.v)

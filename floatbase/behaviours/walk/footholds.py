@@ -203,7 +203,8 @@ def raibert_foothold(foot: str, touchdown: float, walk: Walk) -> Array:
     arm = nominal - path.position
     turning = yaw_rate * np.array([-arm[1], arm[0]])
     centripetal = yaw_rate * np.array([-velocity[1], velocity[0]])
-    point = neutral_point(nominal, velocity + turning, gait.period - gait.swing)
+    # as `neutral_point`, without its checks
+    point = nominal + (velocity + turning) * (gait.period - gait.swing) / 2.0
     foothold: Array = point - centripetal / walk.omega**2
     if walk.options.ground is None:
         return foothold

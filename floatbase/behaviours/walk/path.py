@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import cos, sin
 
 import numpy as np
@@ -30,6 +31,7 @@ class Path:
     yaw: float
     velocity: Array
 
+    @lru_cache(maxsize=64)  # noqa: B019 (a plan needs each of its times for several feet)
     def moved(self, desired: DesiredMotion, t: float) -> Path:
         """Return the path at a later time.
 

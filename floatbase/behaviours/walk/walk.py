@@ -537,9 +537,10 @@ class Walk:
             swinging = bool(active.plan.planned_swings)
             delay = partial(weight_shift, posture, state, t) if self.waits_for_weight else None
             new_gait = progress.clock.update(self._gait, swinging, t, delay)
-            self._refresh()
+            progress.desired = self._desired_motion(swinging, active.path.time)
             stance, swings = progress.clock.stance(names, t), active.swings
             if not new_gait and stance == active.plan.stance and t < active.plan.replan_time:
+                self._refresh()
                 progress.next_change = progress.clock.next_change(t, active.plan.replan_time)
                 return
             footing, shift = next_footing(active.plan, swings, state, stance, t)
