@@ -559,7 +559,7 @@ class WholeBodyController:
         """
         tick = self._compiled
         assert tick is not None  # it answered
-        x, mu = result[: tick.forces.stop], tick.multipliers(result, n_active, inputs)
+        x, mu = result[: tick.forces.stop], tick.multipliers(q, result, n_active, inputs)
         return Solution(tick.qp(q, v, t, inputs), x, mu, "compiled", n_active)
 
     def replace(
@@ -604,7 +604,12 @@ class WholeBodyController:
         other = self._with_problem(problem)
         if other._compiled is None:
             problem.check()
-        elif tasks is not None or limits is not None or other._compiled.user_terms.any:
+        elif (
+            tasks is not None
+            or limits is not None
+            or self.limits.inequalities
+            or other._compiled.user_terms.any
+        ):
             # what the problem arrays have not checked
             problem.check(other._compiled.unchecked_tasks)
         return other
