@@ -188,8 +188,9 @@ def _pack_builtin_contact(
     robot: Robot, contact: Any, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Return one contact of a built-in class, as `_pack_contact` does."""
-    kind, cones = contact_kind(contact), np.zeros((0, 5))
-    frame, surface, points = "", np.zeros(7), np.zeros((0, 3))
+    kind, surface = contact_kind(contact), np.zeros(7)
+    cones: Array = np.zeros((0, 5))
+    points: Array = np.zeros((0, 3))
     if kind in (FIXED_FRAME, DRIVEN_FRAME):
         frame = contact.function.frame
     else:

@@ -25,12 +25,10 @@ from floatbase.control.tick.targets import compiled_rows
 from floatbase.dynamics import (
     EquationsOfMotion,
     FrictionContact,
-    MotionConstraint,
     constraint_and_jacobian,
     equations_of_motion,
 )
 from floatbase.errors import InputError
-from floatbase.objectives import CentreOfPressureTask
 from floatbase.robots import State
 
 UNBOUNDED = 1e300  # N, for inf among numbers that must be finite
@@ -88,9 +86,6 @@ class UserTerms:
         self.names = [contact.name for contact, kind in self._contacts if kind == USER_DEFINED]
         self.names += [task.name for _, task, _ in self._tasks]
         self.names += [each.name for each in functions]
-        self._needs_positions = any(type(task) is CentreOfPressureTask for task in problem.tasks)
-        for each, _ in self._inequalities:
-            self._needs_positions |= type(each.coefficients) is CapturePointRows
         bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
         self._constant_bounds = (
             (bounds[0], bounds[1])
@@ -141,7 +136,10 @@ class UserTerms:
                 continue
             A, b, J = constraint_and_jacobian(contact, state, t)
             contacts.append((A, b, J))
-            packed += A.ravel(), b, J.ravel(), self._positions(contact, state)
+            packed += A.ravel(), b, J.ravel()
+            if isinstance(contact, FrictionContact):
+                shape = len(contact.point_names), 3
+                packed.append(as_array("positions", contact.positions(state), shape).ravel())
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
@@ -156,15 +154,6 @@ class UserTerms:
         return TickInputs(
             np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
         )
-
-    def _positions(self, contact: MotionConstraint, state: State) -> Array:
-        """Return the positions of a contact's points as one array, zeros if nothing needs them."""
-        if not isinstance(contact, FrictionContact):
-            return np.zeros(0)
-        n = len(contact.point_names)
-        if not self._needs_positions:
-            return np.zeros(3 * n)
-        return as_array(f"positions of {contact.name}", contact.positions(state), (n, 3)).ravel()
 
     def equations(self, state: State, t: float, inputs: TickInputs) -> EquationsOfMotion:
         """Return the equations (7) with the values of user-defined contacts in a tick."""
