@@ -40,7 +40,7 @@ def test_the_time_of_every_task_constraint_and_inequality_is_measured():
         makes = getattr(each, "__annotations__", {}).get("return", "")
         is_constraint = hasattr(each, "row_names") and not getattr(each, "_is_protocol", False)
         if makes in {"LinearConstraint", "LinearInequality"} or is_constraint:
-            assert each.__name__ in {*names, "FlatFootContact"}  # the feet of g1 and talos
+            assert each.__name__ in {*names, "FlatFootContact", "LinearInequality"}
     blocks = {each.block for each in tick.added_inequalities(robot).values()}
     assert blocks == set(typing.get_args(dynamics.Block))
 
