@@ -166,8 +166,8 @@ class CompiledTick:
 
     def workspace(self, inputs: TickInputs | None = None) -> tuple[Array, Indices]:
         """Return this thread's memory for one tick with these inputs or the default ones."""
-        sizes = self._sizes
-        if inputs is not None and self.user_terms.any:
+        sizes, default = self._sizes, self.default_inputs.packed.size
+        if inputs is not None and (inputs.n_user_rows or inputs.packed.size != default):
             n_inputs, n_user_rows = inputs.packed.size, inputs.n_user_rows
             sizes = self._workspace_sizes(self.tables[0], n_inputs, n_user_rows)
         floats, ints = _memory.arrays

@@ -27,7 +27,7 @@ except ImportError:  # Windows
 from floatbase import _geometry
 from floatbase.control.problem import INCONSISTENCY_TOLERANCE
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
-from floatbase.dynamics.constraints import MIN_TILT
+from floatbase.dynamics._compiled import MIN_TILT
 from floatbase.qp import FEASIBILITY_TOLERANCE
 from floatbase.robots import UNIT_NORM_TOLERANCE
 

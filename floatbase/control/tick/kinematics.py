@@ -25,7 +25,7 @@ from floatbase.control.tick.vectors import (
     write_row,
 )
 from floatbase.control.tick.workspace import clear
-from floatbase.dynamics.constraints import MIN_TILT
+from floatbase.dynamics._compiled import MIN_TILT
 
 
 class ContactTable(NamedTuple):

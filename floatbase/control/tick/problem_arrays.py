@@ -27,7 +27,7 @@ from floatbase.dynamics import (
     PointContact,
     RollingWheel,
 )
-from floatbase.dynamics.constraints import FrameMotion
+from floatbase.dynamics._compiled import FrameMotion
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import AxisTask
 from floatbase.robots import Robot

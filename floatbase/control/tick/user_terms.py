@@ -82,6 +82,9 @@ class UserTerms:
         )
         functions = [each for each, fixed in self._inequalities if fixed is None]
         self.any = bool(self._tasks or self._contacts or functions)
+        self._needs_state = {kind for _, kind in self._contacts} != {DRIVEN_FRAME} or bool(
+            self._tasks or functions
+        )
         self.varies = self.any or self._limits.time_varying
         self.names = [contact.name for contact, kind in self._contacts if kind == USER_DEFINED]
         self.names += [task.name for _, task, _ in self._tasks]
@@ -127,19 +130,21 @@ class UserTerms:
         residuals = {}
         n_user_rows = 0
         inequalities = []
-        state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
-        eom = EquationsOfMotion(state, problem.contacts, t)
+        eom: Any = None
+        if self._needs_state:
+            state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
+            eom = EquationsOfMotion(state, problem.contacts, t)
         for contact, kind in self._contacts:
             if kind == DRIVEN_FRAME:
                 contacts.append((cast(Any, contact).function.acceleration_at(t),))
                 packed += contacts[-1]
                 continue
-            A, b, J = constraint_and_jacobian(contact, state, t)
+            A, b, J = constraint_and_jacobian(contact, eom.state, t)
             contacts.append((A, b, J))
             packed += A.ravel(), b, J.ravel()
             if isinstance(contact, FrictionContact):
                 shape = len(contact.point_names), 3
-                packed.append(as_array("positions", contact.positions(state), shape).ravel())
+                packed.append(as_array("positions", contact.positions(eom.state), shape).ravel())
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
