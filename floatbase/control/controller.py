@@ -337,8 +337,7 @@ class WholeBodyController:
     def targets(self) -> Mapping[str, slice]:
         """Entries of each task in an array of all targets, by the task's name.
 
-        Only tasks of this package that the compiled backend supports have entries: `CoMTask`,
-        `OrientationTask`, `FrameTask`, `PostureTask`, `ForceTask` and `TorqueTask`. The entries are
+        All tasks of this package have entries, user-defined tasks have none. The entries are
         the target and its derivatives, for example position, velocity and acceleration. Rotation
         matrices are stored row by row. If several tasks have the same name, the entries are those
         of the first one.
