@@ -19,9 +19,15 @@ import numpy as np
 from harness import ROBOTS, SPREADS, clock, interleaved, microseconds, states
 
 import floatbase as fb
-from floatbase.control import JointLimits, LinearInequality
+from floatbase.control import JointLimits, LinearInequality, capture_point_inequality
 from floatbase.control.tick import tick
-from floatbase.dynamics import EquationsOfMotion, LinearConstraint
+from floatbase.dynamics import (
+    EquationsOfMotion,
+    LinearConstraint,
+    RollingWheel,
+    fixed_frame,
+    moving_frame,
+)
 from floatbase.objectives import (
     AngularMomentumTask,
     AxisTask,
@@ -139,22 +145,52 @@ def added_tasks(robot: fb.Robot) -> list[Task]:
     ]
 
 
+def added_inequalities(robot: fb.Robot) -> dict[str, LinearInequality]:
+    """Return inequalities that hold, of each kind of the package."""
+    k = fb.Contacts.feet(robot).k
+    rows = {
+        f"LinearInequality on {block}": LinearInequality(block, block, (np.eye(n), np.full(n, 1e4)))
+        for block, n in (("qdd", robot.nv), ("tau", robot.d), ("forces", k))
+    }
+    return rows | {"capture_point_inequality": capture_point_inequality()}
+
+
+def added_contacts(robot: fb.Robot) -> dict[str, fb.Contacts]:
+    """Return contacts with each kind of constraint; wheels replace the feet."""
+    feet, frame = fb.Contacts.feet(robot), "base"
+    wheels = [RollingWheel(foot.frame, [0.0, 1.0, 0.0], 0.02) for foot in robot.feet]
+    return {
+        "fixed_frame": feet + fb.Contacts([fixed_frame(frame)]),
+        "moving_frame": feet + fb.Contacts([moving_frame(frame, lambda t: np.zeros(3))]),
+        "RollingWheel": fb.Contacts(wheels),
+    }
+
+
 def one_more_task(n: int) -> Rows:
-    """Measure the control step with each task added to `standing_tasks`, relative to without."""
+    """Measure the control step with each task, inequality or constraint, relative to without."""
     for name in ("go2", "g1", "talos"):
         robot = fb.load(name)
         feet, standing = fb.Contacts.feet(robot), fb.standing_tasks(robot.standing())
-        added = added_tasks(robot)
-        lists = [standing, *((*standing, task) for task in added)]
-        controllers = [fb.WholeBodyController(robot, feet, tasks) for tasks in lists]
-        times = np.median(interleaved(controllers, states(robot, n, SPREADS["easy"]), 3), axis=1)
-        for task, after in zip(added, times[1:], strict=True):
-            yield [
-                name,
-                type(task).__name__,
-                *microseconds([times[0], after]),
-                f"{after / times[0]:.2f}",
-            ]
+        added = {
+            "": controller(robot),
+            **{
+                type(task).__name__: fb.WholeBodyController(robot, feet, [*standing, task])
+                for task in added_tasks(robot)
+            },
+            **{
+                label: controller(robot, inequalities=[each])
+                for label, each in added_inequalities(robot).items()
+            },
+            **{
+                label: controller(robot, contacts=contacts)
+                for label, contacts in added_contacts(robot).items()
+            },
+            "contact_weight": controller(robot, contact_weight=1e4),
+        }
+        at = states(robot, n, SPREADS["easy"])
+        without, *times = np.median(interleaved(list(added.values()), at, 3), axis=1)
+        for label, after in zip(list(added)[1:], times, strict=True):
+            yield [name, label, *microseconds([without, after]), f"{after / without:.2f}"]
 
 
 # joint limits -------------------------------------------------------------------------------------
@@ -272,8 +308,8 @@ def main() -> None:
             "inequalities | user-defined constraint | user-defined task, reference",
             own(few),
         ),
-        "Each task added to `standing_tasks` (median):",
-        harness.table("robot | task | without | with | ratio", one_more_task(few)),
+        "Each task, inequality or constraint added to `standing_tasks` (median):",
+        harness.table("robot | added | without | with | ratio", one_more_task(few)),
         "Growth of the median control step (tick.png):",
         harness.table(
             "what | number | easy | saturated",

@@ -8,6 +8,9 @@ import numpy as np
 
 from floatbase._validation import Array
 
+MIN_EDGE = 1e-6  # m: rounding decides the direction of shorter edges
+_ON_EDGE = 1e-9  # m: rounding decides on which side of an edge such a point is
+
 
 def rotation_z(angle: float) -> Array:
     """Return the rotation matrix about the z axis by an angle [rad]."""
@@ -53,6 +56,34 @@ def convex_hull(points: Array) -> Array:
             half.append((x, y))
         corners += half[:-1]
     return np.array(corners or ordered)
+
+
+def first_corner(points: Array) -> int:
+    """Return the index of a corner of the convex hull of points (n, 2 or more).
+
+    Like `next_corner`, this function is also compiled, as a part of the controller.
+    """
+    first, largest = 0, 0.0  # the point that is farthest from point 0
+    for i in range(len(points)):
+        distance = ((points[i, 0] - points[0, 0]) ** 2 + (points[i, 1] - points[0, 1]) ** 2) ** 0.5
+        if distance > largest + MIN_EDGE:
+            first, largest = i, distance
+    return first
+
+
+def next_corner(points: Array, i: int) -> int:
+    """Return the index of the corner after corner i, counter-clockwise; i if there is no other.
+
+    Points on an edge are no corners. Points nearer to each other than `MIN_EDGE` are one corner.
+    """
+    found, x, y, length = i, 0.0, 0.0, 0.0  # direction and distance of the point found
+    for k in range(len(points)):
+        dx, dy = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1]
+        distance, side = (dx * dx + dy * dy) ** 0.5, x * dy - y * dx
+        is_next = side < -_ON_EDGE or (side <= _ON_EDGE and distance > length + MIN_EDGE)
+        if distance > MIN_EDGE and (found == i or is_next):
+            found, x, y, length = k, dx / distance, dy / distance, distance
+    return found
 
 
 def distance_to_polygon(points: Array, polygon: Array) -> Array:

@@ -3,6 +3,7 @@
 import mmap
 import socket
 import sys
+import typing
 from pathlib import Path
 
 import numpy as np
@@ -23,14 +24,25 @@ import soak  # noqa: E402
 import tick  # noqa: E402
 
 import floatbase as fb  # noqa: E402
-from floatbase import objectives  # noqa: E402
+from floatbase import control, dynamics, objectives  # noqa: E402
 from floatbase.objectives._task import TargetTask  # noqa: E402
 
 
-def test_the_time_of_every_task_is_measured():
+def test_the_time_of_every_task_constraint_and_inequality_is_measured():
     public = {getattr(objectives, name) for name in objectives.__all__}
     tasks = {each for each in public if isinstance(each, type) and issubclass(each, TargetTask)}
-    assert tasks == {type(task) for task in tick.added_tasks(fb.load("go2"))}
+    robot = fb.load("go2")
+    assert tasks == {type(task) for task in tick.added_tasks(robot)}
+    added = {type(c).__name__ for group in tick.added_contacts(robot).values() for c in group}
+    names = {*added, *tick.added_inequalities(robot), *tick.added_contacts(robot)}
+    public = [getattr(module, name) for module in (dynamics, control) for name in module.__all__]
+    for each in public:
+        makes = getattr(each, "__annotations__", {}).get("return", "")
+        is_constraint = hasattr(each, "row_names") and not getattr(each, "_is_protocol", False)
+        if makes in {"LinearConstraint", "LinearInequality"} or is_constraint:
+            assert each.__name__ in {*names, "FlatFootContact", "LinearInequality"}
+    blocks = {each.block for each in tick.added_inequalities(robot).values()}
+    assert blocks == set(typing.get_args(dynamics.Block))
 
 
 def test_the_friction_rows_are_those_of_the_peers():

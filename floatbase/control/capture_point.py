@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 
-from floatbase._geometry import convex_hull
+from floatbase._geometry import first_corner, next_corner
 from floatbase._validation import Array, as_positive
 from floatbase.control.limits import LinearInequality
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.errors import InputError
-
-_MIN_EDGE = 1e-6  # m: rounding decides the direction of shorter edges
 
 
 def capture_point_inequality(
@@ -67,35 +65,51 @@ def capture_point_inequality(
     """
     margin = as_positive("margin", margin, "m", allow_zero=True)
     horizon = as_positive("horizon", horizon, "s")
-    return LinearInequality(name, "qdd", partial(_coefficients, margin, horizon), weight=weight)
+    return LinearInequality(name, "qdd", CapturePointRows(margin, horizon), weight=weight)
 
 
-def _coefficients(
-    margin: float, horizon: float, eom: EquationsOfMotion, t: float
-) -> tuple[Array, Array]:
-    """Return G and h of the inequalities [m/s²]."""
-    state, points = eom.state, eom.contacts.positions(eom.state)
-    normals, offsets = _edges(points[:, :2])
-    name = "height of the centre of mass above the contact points"
-    height = as_positive(name, state.com[2] - points[:, 2].mean(), "m")
-    omega = np.sqrt(eom.robot.gravity / height)
-    # ξ(T) = still + gain c̈
-    still = state.com[:2] + (horizon + 1.0 / omega) * state.com_velocity[:2]
-    gain = 0.5 * horizon**2 + horizon / omega
-    allowed = (offsets - margin - normals @ still) / gain
-    return normals @ state.com_jacobian[:2], allowed - normals @ state.com_drift[:2]
+@dataclass(frozen=True)
+class CapturePointRows:
+    """Coefficients of a `capture_point_inequality` with these arguments."""
+
+    margin: float
+    horizon: float
+
+    def __call__(self, eom: EquationsOfMotion, t: float) -> tuple[Array, Array]:
+        """Return G and h [m/s²]."""
+        state, horizon, points = eom.state, self.horizon, eom.contacts.positions(eom.state)
+        normals, offsets = _edges(points[:, :2])
+        name = "height of the centre of mass above the contact points"
+        height = as_positive(name, state.com[2] - points[:, 2].mean(), "m")
+        omega = np.sqrt(eom.robot.gravity / height)
+        # ξ(T) = still + gain c̈
+        still = state.com[:2] + (horizon + 1.0 / omega) * state.com_velocity[:2]
+        gain = 0.5 * horizon**2 + horizon / omega
+        allowed = (offsets - self.margin - normals @ still) / gain
+        return normals @ state.com_jacobian[:2], allowed - normals @ state.com_drift[:2]
+
+
+def support_corners(points: Array) -> list[int]:
+    """Return which points, (n, 2 or more), are corners of the support polygon, in their order."""
+    corner, corners = first_corner(points), list[int]()
+    while corner not in corners:
+        corners.append(corner)
+        corner = next_corner(points, corner)
+    return sorted(corners)
 
 
 def _edges(points: Array) -> tuple[Array, Array]:
-    """Return n and d of the half-planes n · x ≤ d whose intersection is the convex hull."""
-    corners = convex_hull(points) if len(points) else points
-    edges = np.roll(corners, -1, axis=0) - corners
-    lengths = np.linalg.norm(edges, axis=1)
-    long = lengths > _MIN_EDGE
-    if np.sum(long) < 3:
+    """Return n and d of the half-planes n · x ≤ d whose intersection is the support polygon.
+
+    They are in the order of the points at which their edges start, counter-clockwise.
+    """
+    corners = support_corners(points)
+    if len(corners) < 3:
         raise InputError(
             f"The support polygon of {len(points)} contact points has no interior. The capture "
             f"point needs at least 3 contact points that are not on one line."
         )
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]])[long] / lengths[long, None]
-    return normals, np.sum(normals * corners[long], axis=1)
+    starts, ends = points[corners], points[[next_corner(points, i) for i in corners]]
+    normals = np.column_stack([ends[:, 1] - starts[:, 1], starts[:, 0] - ends[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * starts, axis=1)

@@ -358,8 +358,7 @@ class WholeBodyController:
     def targets(self) -> Mapping[str, slice]:
         """Entries of each task in an array of all targets, by the task's name.
 
-        Only tasks of this package that the compiled backend supports have entries: `CoMTask`,
-        `OrientationTask`, `FrameTask`, `PostureTask`, `ForceTask` and `TorqueTask`. The entries are
+        All tasks of this package have entries, user-defined tasks have none. The entries are
         the target and its derivatives, for example position, velocity and acceleration. Rotation
         matrices are stored row by row. If several tasks have the same name, the entries are those
         of the first one.
@@ -583,7 +582,7 @@ class WholeBodyController:
         """
         tick = self._compiled
         assert tick is not None  # it answered
-        x, mu = result[: tick.forces.stop], tick.multipliers(result, n_active, inputs)
+        x, mu = result[: tick.forces.stop], tick.multipliers(q, result, n_active, inputs)
         return Solution(tick.qp(q, v, t, inputs), x, mu, "compiled", n_active)
 
     def replace(
@@ -628,7 +627,12 @@ class WholeBodyController:
         other = self._with_problem(problem)
         if other._compiled is None:
             problem.check()
-        elif tasks is not None or limits is not None or other._compiled.user_terms.any:
+        elif (
+            tasks is not None
+            or limits is not None
+            or self.limits.inequalities
+            or other._compiled.user_terms.any
+        ):
             # what the problem arrays have not checked
             problem.check(other._compiled.unchecked_tasks)
         return other

@@ -530,16 +530,21 @@ def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality |
         G[i, at] = contacts.normals[i]
     rows = read_only(np.vstack([-G[has_minimum], G[has_maximum]]))
 
+    def bounds_at(t: float) -> Array:
+        """Return the bounds at time t."""
+        least, largest = limits.normal_forces(contacts, t)
+        return np.concatenate([-least[has_minimum], largest[has_maximum]])
+
     def coefficients(eom: EquationsOfMotion, t: float) -> Coefficients:
         """Return the rows and the bounds at time t."""
-        least, largest = limits.normal_forces(contacts, t)
-        return rows, np.concatenate([-least[has_minimum], largest[has_maximum]])
+        return rows, bounds_at(t)
 
     points = np.array(contacts.point_names)
     names = [f"smallest {point}" for point in points[has_minimum]]
     names += [f"largest {point}" for point in points[has_maximum]]
     weight = limits.normal_force_weight
-    return LinearInequality("soft normal force", "forces", coefficients, names, weight)
+    given = coefficients if limits.time_varying else (rows, bounds_at(0.0))
+    return LinearInequality("soft normal force", "forces", given, names, weight)
 
 
 @lru_cache(maxsize=64)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -22,13 +21,12 @@ from floatbase._validation import (
     short_repr,
     unit_vector,
 )
+from floatbase.dynamics._compiled import MIN_TILT, FrameMotion
 from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact
 from floatbase.errors import InputError
 from floatbase.robots import State
 
 _MAX_ROWS = 1000  # limit for a single constraint
-# sine of the angle between axle and normal below which rounding decides the lowest point
-_MIN_TILT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +202,7 @@ class RollingWheel(SinglePointContact):
         axle_rate = cross(omega, axle)
         w = n - (n @ axle) * axle
         length = float(np.linalg.norm(w))
-        if length < _MIN_TILT:
+        if length < MIN_TILT:
             raise InputError(
                 f"The wheel {self.frame} lies flat on its side, so it has no single lowest point "
                 f"to roll on. Tilt the wheel, or use another contact for it."
@@ -232,9 +230,7 @@ def fixed_frame(frame: str) -> LinearConstraint:
         The constraint "bolts of …", whose λ consists of a force [N] and a moment [N·m] in world
         axes.
     """
-    return LinearConstraint(
-        f"bolts of {as_string('frame', frame)}", 6, partial(_fixed_frame_rows, frame)
-    )
+    return LinearConstraint(f"bolts of {as_string('frame', frame)}", 6, FrameMotion(frame))
 
 
 def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
@@ -258,21 +254,5 @@ def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearCo
     Note 6 of the course text.
     """
     as_callable("acceleration", acceleration, "acceleration(t)")
-    return LinearConstraint(
-        f"drive of {as_string('frame', frame)}", 3, partial(_moving_frame_rows, frame, acceleration)
-    )
-
-
-# module-level functions, so that constraints can be pickled
-def _fixed_frame_rows(frame: str, state: State, t: float) -> tuple[Array, Array]:
-    """Compute A and b of a fixed frame."""
-    return state.frame_jacobian(frame), -state.frame_drift(frame)
-
-
-def _moving_frame_rows(
-    frame: str, acceleration: Callable[[float], Array], state: State, t: float
-) -> tuple[Array, Array]:
-    """Compute A and b of a frame with a prescribed acceleration."""
-    return state.frame_jacobian(frame)[:3], as_array(
-        "acceleration", acceleration(t), (3,)
-    ) - state.frame_drift(frame)[:3]
+    function = FrameMotion(frame, acceleration)
+    return LinearConstraint(f"drive of {as_string('frame', frame)}", 3, function)

@@ -142,7 +142,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
     compiled = _compiled(made)
     sizes, ints, floats = compiled.pack(made.problem)
     inputs = compiled.default_inputs
-    n_floats, n_ints = tick.workspace_sizes(sizes, 0)
+    n_floats, n_ints = tick.workspace_sizes(sizes, inputs.packed.size)
 
     def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
         limits = replace(

@@ -52,6 +52,7 @@ class CentreOfPressureTask(TargetTask):
     name: str = "centre of pressure"
     block: ClassVar[Block] = "forces"
     target_shapes: ClassVar[Shapes] = {"position": (3,)}
+    compiled_as = "centre of pressure"
 
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """Compute the horizontal moment of the contact forces about the target.

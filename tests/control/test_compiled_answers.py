@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import judges
@@ -11,8 +12,14 @@ import pytest
 from messages import missing, raises
 
 import floatbase as fb
+from floatbase.control import LinearInequality, capture_point_inequality
 from floatbase.control.tick import CompiledTick
-from floatbase.dynamics import CONSTRAINT_RANK_TOLERANCE
+from floatbase.dynamics import (
+    CONSTRAINT_RANK_TOLERANCE,
+    RollingWheel,
+    fixed_frame,
+    moving_frame,
+)
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
 from floatbase.objectives import (
@@ -380,6 +387,7 @@ def moving_tasks(robot: Robot) -> dict[str, Any]:
         "axis": AxisTask(foot, [0.2, 0.3, 1.0], lambda t: ([t, 0.4, 2.0], rates[:3], rates[3:])),
         "axis on target": AxisTask("base", [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
         "momentum": AngularMomentumTask(lambda t: (t * rates[:3], rates[3:]), kd=3.0),
+        "pressure": CentreOfPressureTask(lambda t: [*robot.standing().com[:2], 0.1 * t]),
     }
 
 
@@ -392,6 +400,76 @@ def test_tasks_on_axes_relative_poses_and_momentum_are_compiled(name):
         both = judges.pair(robot, judges.stance(robot), [*standing, *tasks])
         assert not both[0].compiled.user_terms.any
         assert judges.largest_difference(both, judges.states(name, 3, 0.1), t=0.4) < bound
+
+
+def added_terms(robot: Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
+    """Return contacts and options of a controller: each kind of constraint and inequality."""
+    feet, first = fb.Contacts.feet(robot), robot.feet[0].frame
+    others, joints = feet.without(first), np.eye(robot.nv)[-4:]
+    sides = LinearInequality("sides", "qdd", (np.vstack([joints, -joints]), np.ones(8)), weight=2.0)
+    rise = LinearInequality("rise", "tau", (np.eye(robot.d)[:3], np.full(3, 0.5)), weight=1.0)
+    load = LinearInequality("load", "forces", (np.ones((1, feet.k)), [robot.weight]), weight=10.0)
+    capture = [capture_point_inequality(0.03, 0.05, str(w), weight=w) for w in (50.0, 2.0)]
+    wheels = [
+        RollingWheel(
+            foot.frame, [0.1 * i, 1.0, 0.2], 0.05, [0.1, 0.05, 1.0], centre=[0.0, 0.1, 0.2]
+        )
+        for i, foot in enumerate(robot.feet)
+    ]
+    drive = fb.Contacts([moving_frame(first, lambda t: np.array([0.1, 0.2, t]))])
+    return {
+        "hard rows": (feet, {"inequalities": [replace(sides, weight=None)]}),
+        "soft rows": (feet, {"inequalities": [rise, capture[0], load, sides, capture[1]]}),
+        "soft normal forces": (feet, {"min_normal_force": 20.0, "normal_force_weight": 3.0}),
+        "soft contacts": (feet, {"contact_weight": 1e3, "inequalities": capture}),
+        "fixed frame": (fb.Contacts([fixed_frame("base")]) + feet, {}),
+        "driven frame": (drive + others, {"inequalities": capture}),
+        "wheels": (fb.Contacts(wheels), {"inequalities": capture if len(wheels) > 2 else []}),
+    }
+
+
+@pytest.mark.parametrize("name", ["go2", "talos"])
+def test_constraints_and_inequalities_of_the_package_are_compiled(name):
+    robot = judges.load(name)
+    bound, active = 0.1 * judges.agreement(robot), set()
+    tasks = [*fb.standing_tasks(robot.standing()), *moving_tasks(robot).values()]
+    for contacts, options in added_terms(robot).values():
+        both = judges.pair(robot, contacts, tasks, **options)
+        assert "Python" not in both[0].backend_reason
+        for state in (*judges.states(name, 2, 0.1), robot.standing()):
+            one, other = (each(state.q, state.v, 0.4) for each in both)
+            assert one.backend == "compiled"
+            assert np.max(np.abs(one.tau - other.tau)) < bound
+            assert one.solution.qp.inequality_names == other.solution.qp.inequality_names
+            prove_optimal(one.solution)
+            active |= {row.owner for row in one.active}
+    assert {"sides", "rise", "2.0"} <= active
+
+
+def test_a_wheel_on_its_side_and_a_robot_on_its_back_are_refused_in_the_same_words():
+    robot = judges.load("go2")
+    wheel = fb.Contacts([RollingWheel("FL_foot", [0.0, 1.0, 0.0], 0.05)])
+    for contacts, rows, turn in (
+        (wheel, [], [1.0, 0.0, 0.0, 1.0]),
+        (fb.Contacts.feet(robot), [capture_point_inequality()], [1.0, 0.0, 0.0, 0.0]),
+    ):
+        q = np.concatenate([np.zeros(3), turn / np.linalg.norm(turn), np.zeros(12)])
+        both = judges.pair(robot, contacts, inequalities=rows)
+        assert len({refusal(each, q, np.zeros(18)) for each in both}) == 1
+
+
+@pytest.mark.parametrize(("entry", "change"), [(12, 1e-3), (15, 1e-3), (15, 1e-7), (13, 1e-12)])
+def test_the_last_row_of_a_pose_among_raw_targets_counts_on_both_backends(entry, change):
+    robot, state = judges.load("go2"), judges.load("go2").standing()
+    task = RelativePoseTask("FL_foot", "FR_foot", np.eye(4))
+    both = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(state), task])
+    targets = both[0].targets_at(0.0)
+    targets[both[0].targets[task.name].start + entry] += change
+    if change > 1e-6:
+        assert len({refusal(each, state.q, state.v, 0.0, targets) for each in both}) == 1
+    else:
+        one, other = (each(state.q, state.v, 0.0, targets).tau for each in both)
+        assert np.allclose(one, other, rtol=0.0, atol=judges.agreement(robot))
 
 
 def test_an_axis_opposite_to_its_direction_and_directions_of_any_length_have_answers():
@@ -422,10 +500,11 @@ def test_the_backend_is_visible_and_can_be_chosen():
 
 
 def test_the_reason_of_the_backend_names_what_runs_as_python():
-    robot = judges.load("go2")
-    tasks = [*fb.standing_tasks(robot.standing()), CentreOfPressureTask(np.zeros(3), name="mine")]
-    compiled = judges.pair(robot, judges.stance(robot), tasks)[0]
-    assert not missing(compiled.backend_reason, "Python", "mine")
+    robot, rows = judges.load("go2"), (np.eye(12), np.full(12, 1e3))
+    mine = LinearInequality("mine", "tau", lambda eom, t: rows)
+    others = [LinearInequality("constant", "tau", rows), capture_point_inequality()]
+    compiled = judges.pair(robot, judges.stance(robot), inequalities=[*others, mine])[0]
+    assert compiled.backend_reason.endswith("Python beside it: mine")
 
 
 def test_another_solver_uses_the_reference_backend_and_the_reason_names_the_solver():

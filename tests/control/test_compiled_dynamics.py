@@ -44,7 +44,7 @@ def test_the_tick_computes_what_pinocchio_computes(name):
     model, data, n, nv = robot.model, robot.model.createData(), robot.model.njoints, robot.nv
     # as `take_bodies` takes them
     shapes = (n, 12), (nv, 6), (n, 6), (n, 6), (n, dynamics.RATE + 6), (nv, 6), (nv, nv), (nv, 1)
-    ends = 1 + 2 * robot.d + np.cumsum([0, *map(np.prod, shapes)])
+    ends = 1 + 3 * (nv + 1) + 2 * robot.d + np.cumsum([0, *map(np.prod, shapes)])
     for seed in range(5):
         state = robot.random_state(seed, 1.0)
         q, v = np.array(state.q), np.array(state.v)

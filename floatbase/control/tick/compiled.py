@@ -14,9 +14,15 @@ from threading import Event, Thread, local
 import numpy as np
 
 from floatbase._validation import Array
+from floatbase.control.capture_point import support_corners
 from floatbase.control.limits import force_rows, hard_maximum
 from floatbase.control.problem import Problem, assemble_qp, modified_qp, residual_of
-from floatbase.control.tick.problem_arrays import HAS_CONES, Indices, pack_problem
+from floatbase.control.tick.problem_arrays import (
+    HAS_CONES,
+    N_CONTACT_NUMBERS,
+    Indices,
+    pack_problem,
+)
 from floatbase.control.tick.targets import TargetLayout, compiled_rows
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
 from floatbase.qp import QP
@@ -135,7 +141,9 @@ class CompiledTick:
             for i, task in enumerate(problem.tasks)
             if i in time_varying or not compiled_rows(task)
         ]
-        self.default_inputs = self.user_terms.zero_inputs(self.layout.constant)
+        self.default_inputs = self.user_terms.constant_inputs(
+            self.layout.constant, int(self.tables[0][N_CONTACT_NUMBERS])
+        )
         self._q_shape = (robot.nq,)
         self._v_shape = (nv,)
         self._n_multipliers = nv + k
@@ -154,11 +162,14 @@ class CompiledTick:
         self._has_soft = np.isfinite(min(self._soft_weights, default=np.inf)) or (
             joint_weight is not None
         )
-        self._sizes = self._workspace_sizes(self.tables[0], 0)
+        self._sizes = self._workspace_sizes(self.tables[0], self.default_inputs.packed.size)
 
-    def workspace(self, n_user_rows: int = 0) -> tuple[Array, Indices]:
-        """Return this thread's memory for one tick, with as many rows of user-defined tasks."""
-        sizes = self._workspace_sizes(self.tables[0], n_user_rows) if n_user_rows else self._sizes
+    def workspace(self, inputs: TickInputs | None = None) -> tuple[Array, Indices]:
+        """Return this thread's memory for one tick with these inputs or the default ones."""
+        sizes, default = self._sizes, self.default_inputs.packed.size
+        if inputs is not None and (inputs.n_user_rows or inputs.packed.size != default):
+            n_inputs, n_user_rows = inputs.packed.size, inputs.n_user_rows
+            sizes = self._workspace_sizes(self.tables[0], n_inputs, n_user_rows)
         floats, ints = _memory.arrays
         if floats.size < sizes[0] or ints.size < sizes[1]:
             floats, ints = _memory.arrays = np.empty(sizes[0]), np.empty(sizes[1], np.int64)
@@ -166,7 +177,7 @@ class CompiledTick:
 
     def run(self, q: Array, v: Array, inputs: TickInputs, n_stages: int) -> tuple[Array, int]:
         """Run the first stages of one tick; return its numbers, and the number of active rows."""
-        result, workspace = self.empty_result(inputs), self.workspace(inputs.n_user_rows)
+        result, workspace = self.empty_result(inputs), self.workspace(inputs)
         n_active = self._tick(q, v, inputs.packed, *self.tables, *workspace, result, n_stages)
         return result, n_active
 
@@ -224,7 +235,7 @@ class CompiledTick:
         """Return an uninitialized array for the numbers of one tick."""
         size = self.forces.stop + 2 * self._n_multipliers
         if self._has_soft:
-            size += 2 * self._problem.robot.d + sum(len(h) for _, h in inputs.inequalities)
+            size += 2 * self._problem.robot.d + sum(self._group_sizes(inputs))
         return np.empty(size)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:
@@ -240,9 +251,14 @@ class CompiledTick:
                 else (task.weight, residual_of(task, eom, t))
             )
             costs.append((task.block, *weight_and_residual))
-        qp = assemble_qp(
-            eom, costs, self._problem.limits, inputs.normal_forces, inputs.inequalities
-        )
+        limits = self._problem.limits
+        inequalities = [
+            each.at(eom, t) if given is None else given
+            for each, given in zip(
+                limits.all_inequalities(eom.contacts), inputs.inequalities, strict=True
+            )
+        ]
+        qp = assemble_qp(eom, costs, limits, inputs.normal_forces, inequalities)
         return modified_qp(self._problem, qp, eom)
 
     def pack(self, problem: Problem) -> tuple[Indices, Indices, Array]:
@@ -265,7 +281,12 @@ class CompiledTick:
                 owners += [(f"{side} {kind}", name, 0) for name in joints]
         return owners
 
-    def multipliers(self, result: Array, n_active: int, inputs: TickInputs) -> Array:
+    def _group_sizes(self, inputs: TickInputs) -> list[int]:
+        """Return how many rows each user-defined inequality has in the tick."""
+        n_points = self._problem.contacts.n_points  # a capture point has a row for each
+        return [n_points if given is None else len(given[1]) for given in inputs.inequalities]
+
+    def multipliers(self, q: Array, result: Array, n_active: int, inputs: TickInputs) -> Array:
         """Return the multipliers of all inequalities of the reference QP."""
         limits, contacts = self._problem.limits, self._problem.contacts
         # the reference QP has rows for limited joints only
@@ -276,7 +297,13 @@ class CompiledTick:
             else limits.joint_limits.bounded.ravel()
         )
         friction = np.full(contacts.n_points * (limits.facets + 1), self.tables[0][HAS_CONES] == 1)
-        group_sizes = [len(h) for _, h in inputs.inequalities]
+        group_sizes = self._group_sizes(inputs)
+        user_rows = np.full(sum(group_sizes), True)
+        for i, end in enumerate(np.cumsum(group_sizes)):
+            if inputs.inequalities[i] is None:
+                points = contacts.positions(State(self._problem.robot, q))
+                user_rows[end - len(points) : end] = False
+                user_rows[end - len(points) + np.array(support_corners(points))] = True
         has_row = np.concatenate(
             [
                 friction,
@@ -284,7 +311,7 @@ class CompiledTick:
                 limited,
                 limited,
                 joints,
-                np.full(sum(group_sizes), True),
+                user_rows,
             ]
         )
         sizes = self.forces.stop, 2 * self._n_multipliers

@@ -8,12 +8,14 @@ import numpy as np
 
 from floatbase.control.tick.dynamics import Bodies, angular_momentum, centre_of_mass, point_velocity
 from floatbase.control.tick.elimination import Parametrisation, add_entry, add_product
+from floatbase.control.tick.inequalities import group_size
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.kinematics import body_jacobian, frame_pose
-from floatbase.control.tick.problem_arrays import FORCES, QDD, TAU
+from floatbase.control.tick.kinematics import ContactTable, body_jacobian, frame_pose
+from floatbase.control.tick.problem_arrays import QDD, TAU
 from floatbase.control.tick.targets import (
     ANGULAR_MOMENTUM,
     AXIS,
+    CENTRE_OF_PRESSURE,
     COM,
     FORCE,
     FRAME,
@@ -22,6 +24,7 @@ from floatbase.control.tick.targets import (
     TORQUE,
 )
 from floatbase.control.tick.vectors import (
+    across,
     column_part,
     cross,
     dot,
@@ -32,6 +35,7 @@ from floatbase.control.tick.vectors import (
     times,
 )
 from floatbase.control.tick.workspace import clear, take_matrix, take_vector
+from floatbase.robots import UNIT_NORM_TOLERANCE
 
 _MAX_ROTATION_ERROR = 1e-9  # of entries of RᵀR: the reference backend corrects or refuses others
 _SMALL_SINE = 1e-9  # as in `AxisTask`
@@ -90,12 +94,6 @@ def is_rotation(x, y, z):
 def strided(numbers, first, stride):
     """Return three numbers of an array, from index `first` on, one in `stride`."""
     return numbers[first], numbers[first + stride], numbers[first + 2 * stride]
-
-
-@jit
-def across(n, x):
-    """Return x - n (n · x)."""
-    return minus(x, times(dot(n, x), n))
 
 
 @jit
@@ -159,6 +157,9 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
         target = rotate(R_reference, x), rotate(R_reference, y), rotate(R_reference, z)
         e, valid = rotation_error(R, target)
         valid = valid and is_rotation(x, y, z)
+        if stride == 4:  # a homogeneous matrix; `e` does not depend on its last row
+            u, one = strided(targets, at + 12, 1), targets[at + 15]
+            valid = valid and max(dot(u, u), abs(one - 1.0)) < _MAX_ROTATION_ERROR
     elif kind == AXIS:  # the first column of R
         n, length = R[0], np.sqrt(dot(x, x))
         direction = times(1.0 / length, x)
@@ -183,7 +184,8 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
 def posture_error(tree, q, v, target, base, e, e_dot):
     """Write e and ė, (d,), of all joints; joints without limits are (cos, sin) in q.
 
-    target: q (nq,), then velocities (d,). base: index of the first joint in v.
+    target: q (nq,), then velocities (d,). base: index of the first joint in v. Returns False if
+    such a pair in the target does not have length 1.
     """
     for i in range(1, tree.shape[0]):
         row, at = tree[i, 1] - base, tree[i, 3]
@@ -195,21 +197,54 @@ def posture_error(tree, q, v, target, base, e, e_dot):
         else:
             sine = q[at + 1] * target[at] - q[at] * target[at + 1]
             e[row] = np.arctan2(sine, q[at] * target[at] + q[at + 1] * target[at + 1])
+            length = np.sqrt(target[at] ** 2 + target[at + 1] ** 2)
+            if abs(length - 1.0) > UNIT_NORM_TOLERANCE:
+                return False
+    return True
+
+
+@jit
+def contact_costs(A, b, weight, space: Parametrisation, R):
+    """Clear R, and write (weight / 2) ‖A q̈ - b‖² of soft contacts, eq. (5), into its first rows.
+
+    Returns the number of these rows.
+    """
+    clear(R)
+    add_product(A, space.V, space.beta_index, R, 0)
+    root, last = np.sqrt(weight), R.shape[1] - 1
+    for i in range(b.size):
+        R[i, last] -= b[i]
+        for c in range(R.shape[1]):
+            R[i, c] *= root
+    return b.size
+
+
+@jit
+def moment_rows(contacts: ContactTable, target, factor, space: Parametrisation, nv, R, row):
+    """Add the horizontal moment of all forces about a point, times a factor, to two rows of R."""
+    V, beta_index = space.V, space.beta_index
+    for i in range(contacts.points.shape[0]):
+        x, y, z = times(factor, minus(row_part(contacts.positions, i, 0), target))
+        force = nv + int(contacts.points[i, 3])
+        add_entry(y, V, beta_index, force + 2, R, row)
+        add_entry(-z, V, beta_index, force + 1, R, row)
+        add_entry(z, V, beta_index, force, R, row + 1)
+        add_entry(-x, V, beta_index, force + 2, R, row + 1)
 
 
 @jit
 def task_costs(
-    q, v, bodies: Bodies, tasks: TaskTable, space: Parametrisation, base, workspace, cost: Cost
-):
-    """Write Σ (weight / 2) ‖residual‖² of all tasks, eqs. (18), (26), into `cost`.
+    q, v, bodies: Bodies, contacts: ContactTable, tasks: TaskTable, space: Parametrisation, base,
+    workspace, cost: Cost, used,
+):  # fmt: skip
+    """Add Σ (weight / 2) ‖residual‖² of all tasks, eqs. (18), (26), to `cost`.
 
     Returns the number of rows of R, or -1 if an angle is too large. q: (nq,). v: (nv,). base:
-    number of rows of (7) without a motor, 6 or 0.
+    number of rows of (7) without a motor, 6 or 0. used: number of rows of R that are in use.
     """
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
-    clear(R)
-    used, rows = 0, take_matrix(workspace, 3, nv)
+    rows = take_matrix(workspace, 3, nv)
     e_joint, e_dot_joint = take_vector(workspace, d), take_vector(workspace, d)
     # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight ×
     # desired
@@ -231,10 +266,16 @@ def task_costs(
             constant = times(root, plus(bias, plus(times(kp, e), times(kd, e_dot))))
             R[used, nb], R[used + 1, nb], R[used + 2, nb] = plus(column_part(R, used, nb), constant)
             used += 3
+        elif kind == CENTRE_OF_PRESSURE:
+            target = strided(tasks.targets, at, 1)
+            moment_rows(contacts, target, np.sqrt(w), space, nv, R, used)
+            used += 2
         else:
             first = nv + k if kind == TORQUE else (nv if kind == FORCE else base)
             if kind == POSTURE:
-                posture_error(bodies.tree, q, v, tasks.targets[at:], base, e_joint, e_dot_joint)
+                target = tasks.targets[at:]
+                if not posture_error(bodies.tree, q, v, target, base, e_joint, e_dot_joint):
+                    return -1
                 at += q.size + d  # the accelerations
             for j in range(k if kind == FORCE else d):
                 desired = tasks.targets[at + j]
@@ -256,7 +297,7 @@ def count_user_rows(inputs, at, n_user, nv, k, d):
     rows = 0
     for _ in range(n_user):
         block, m = int(inputs[at]), int(inputs[at + 1])
-        at = at + 3 + m * (1 + (nv if block == QDD else (k if block == FORCES else d)))
+        at = at + 3 + m * (1 + group_size(block, nv, k, d))
         rows += m
     return rows, at
 
@@ -268,7 +309,7 @@ def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
     for _ in range(tasks.n_user):
         block, m, root = int(inputs[at]), int(inputs[at + 1]), np.sqrt(inputs[at + 2])
-        size, at = nv if block == QDD else (k if block == FORCES else d), at + 3
+        size, at = group_size(block, nv, k, d), at + 3
         for r in range(m):
             for i in range(size):
                 entry = root * inputs[at + r * size + i]

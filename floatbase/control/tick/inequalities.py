@@ -13,12 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from floatbase.control.tick.elimination import Parametrisation
+from floatbase import _geometry
+from floatbase.control.tick.dynamics import Bodies, centre_of_mass
+from floatbase.control.tick.elimination import Parametrisation, add_entry
 from floatbase.control.tick.jit import jit, jit_forceinline
-from floatbase.control.tick.problem_arrays import FORCES, QDD
+from floatbase.control.tick.problem_arrays import CAPTURE_POINT, FORCES, QDD, TAU
 from floatbase.control.tick.vectors import dot, minus, row_part, times
 from floatbase.control.tick.workspace import clear
 from floatbase.qp import FEASIBILITY_TOLERANCE
+
+first_corner, next_corner = jit(_geometry.first_corner), jit(_geometry.next_corner)
 
 
 class Inequalities(NamedTuple):
@@ -32,10 +36,11 @@ class Inequalities(NamedTuple):
     torque_limits: Any  # (d,), N·m
     inputs: Any  # packed by `user_terms.UserTerms`
     bounds: Any  # where the P minimum and P maximum normal forces start in it, N
-    # where user-defined rows start, one group after another: block, number m of rows, weight (0 if
-    # hard), G (m, n), h (m,)
-    user_start: Any
-    n_user_groups: Any  # number of groups
+    # user-defined rows, one group after another: block, number m of rows, weight (0 if hard),
+    # G (m, n), h (m,); see `group_size` and `capture_point_rows`
+    groups: Any
+    n_groups: Any  # their number
+    com: Any  # (3, nb + 1 or more), horizontal acceleration of the CoM in (β, 1), then memory
     has_cones: Any  # whether the controller assumes friction and minimum normal forces
     has_optional: Any  # whether there are any of these, or a maximum normal force
     has_joint_limits: Any
@@ -155,6 +160,70 @@ def violated_force_row(limits: Inequalities, forces):
     return found
 
 
+@jit
+def group_size(block, nv, k, d):
+    """Return how many unknowns a group of rows acts on: q̈, λ, τ, or the CoM's x and y."""
+    return nv if block == QDD else (k if block == FORCES else (d if block == TAU else 2))
+
+
+@jit
+def capture_points(limits: Inequalities, bodies: Bodies, positions, space: Parametrisation):
+    """Write the rows of all capture-point inequalities, and `limits.com`.
+
+    positions: (P, 3), of the contact points. Returns False if one has no support polygon.
+    """
+    nv, d = bodies.v.size, space.T.shape[0]
+    at, k = 0, space.V.shape[0] - nv
+    for _ in range(limits.n_groups):
+        block, m = int(limits.groups[at]), int(limits.groups[at + 1])
+        if block == CAPTURE_POINT:
+            if not capture_point_rows(bodies, positions, limits.groups[at + 3 :]):
+                return False
+            clear(limits.com)
+            _, _, drift, mass = centre_of_mass(bodies)
+            for r in range(2):
+                limits.com[r, space.V.shape[1] - 1] = drift[r]
+                for c in range(nv):
+                    entry = bodies.Ag[c, r] / mass
+                    add_entry(entry, space.V, space.beta_index, c, limits.com, r)
+        at += 3 + m * (group_size(block, nv, k, d) + 1)
+    return True
+
+
+@jit
+def capture_point_rows(bodies: Bodies, points, rows):
+    """Write n · c̈ ≤ h for each edge of the support polygon, as `CapturePointRows` does.
+
+    rows: margin, horizon and gravity; receives n for the edge that starts at each of the points,
+    (P, 2), then h, (P,), and zeros for points that are no corners. Returns False if the polygon has
+    no interior, or if the centre of mass is not above it.
+    """
+    margin, horizon, gravity = rows[0], rows[1], rows[2]
+    n, height = points.shape[0], 0.0
+    p, velocity, _, _ = centre_of_mass(bodies)
+    for i in range(n):
+        height += (p[2] - points[i, 2]) / n
+    if not height > 0.0:
+        return False
+    omega = np.sqrt(gravity / height)
+    gain, ahead = 0.5 * horizon**2 + horizon / omega, horizon + 1.0 / omega
+    x, y = p[0] + ahead * velocity[0], p[1] + ahead * velocity[1]
+    clear(rows[: 3 * n])
+    corner, n_edges = first_corner(points), 0
+    for _ in range(n):
+        end, at = next_corner(points, corner), 2 * corner
+        dx, dy = points[end, 0] - points[corner, 0], points[end, 1] - points[corner, 1]
+        if end == corner or rows[at] != 0.0 or rows[at + 1] != 0.0:
+            break
+        length = np.sqrt(dx * dx + dy * dy)
+        nx, ny = dy / length, -dx / length
+        distance = nx * (points[corner, 0] - x) + ny * (points[corner, 1] - y)
+        rows[at], rows[at + 1] = nx, ny
+        rows[2 * n + corner] = (distance - margin) / gain
+        corner, n_edges = end, n_edges + 1
+    return n_edges >= 3
+
+
 @jit_forceinline
 def force_rows_of(limits: Inequalities):
     """Return the number of rows on forces."""
@@ -203,18 +272,21 @@ def violated_optional_row(limits: Inequalities, space: Parametrisation, beta, fo
         excess = normal_force - limits.inputs[limits.bounds + limits.points + i]
         if excess > worst * cones[row, 3]:
             worst, found = excess / cones[row, 3], cones.shape[0] + i
-    start, inputs = soft_rows_start(limits), limits.inputs
-    at, number = limits.user_start, start + 2 * tau.size
-    for _ in range(limits.n_user_groups):
-        block, m = int(inputs[at]), int(inputs[at + 1])
+    start, groups = soft_rows_start(limits), limits.groups
+    at, number = 0, start + 2 * tau.size
+    for _ in range(limits.n_groups):
+        block, m = int(groups[at]), int(groups[at + 1])
         if block == QDD and not has_qdd:
             affine_value(space.V, beta, 0, qdd.size, qdd)
             has_qdd = True
         x = qdd if block == QDD else (forces if block == FORCES else tau)
+        if block == CAPTURE_POINT:
+            x = limits.com[2, :2]
+            affine_value(limits.com, beta, 0, 2, x)
         for i in range(m):
-            excess, square = -inputs[at + 3 + m * x.size + i], 0.0
+            excess, square = -groups[at + 3 + m * x.size + i], 0.0
             for c in range(x.size):
-                entry = inputs[at + 3 + i * x.size + c]
+                entry = groups[at + 3 + i * x.size + c]
                 excess += entry * x[c]
                 square += entry * entry
             if limits.saturated.size > 0 and limits.saturated[number + i - start] > 0.0:
@@ -257,20 +329,22 @@ def violated_row(limits: Inequalities, space: Parametrisation, beta, forces, tau
 @jit
 def user_row_in_beta(number, limits: Inequalities, space: Parametrisation, nv, out):
     """Do the same as `row_in_beta` for a user-defined row, numbered from the first of them."""
-    V, T, inputs, at = space.V, space.T, limits.inputs, limits.user_start
+    V, T, groups, at = space.V, space.T, limits.groups, 0
     k, nb = V.shape[0] - nv, V.shape[1] - 1
     clear(out)
     while True:
-        block, m = int(inputs[at]), int(inputs[at + 1])
-        size = nv if block == QDD else (k if block == FORCES else T.shape[0])
+        block, m = int(groups[at]), int(groups[at + 1])
+        size = group_size(block, nv, k, T.shape[0])
         if number < m:
             break
         at, number = at + 3 + m * (size + 1), number - m
-    bound = inputs[at + 3 + m * size + number]
+    bound = groups[at + 3 + m * size + number]
     for i in range(size):
-        entry = inputs[at + 3 + number * size + i]
+        entry = groups[at + 3 + number * size + i]
         if entry != 0.0:
-            row = V[i] if block == QDD else (V[nv + i] if block == FORCES else T[i])
+            row = limits.com[i] if block == CAPTURE_POINT else (T[i] if block == TAU else V[i])
+            if block == FORCES:
+                row = V[nv + i]
             for c in range(nb):
                 out[c] += entry * row[c]
             bound -= entry * row[nb]
@@ -316,15 +390,14 @@ def weight_of_row(number, limits: Inequalities, nv, k):
     number -= soft_rows_start(limits)
     if number < 0 or limits.saturated.size == 0:
         return np.inf
-    d, inputs, at = limits.least.size, limits.inputs, limits.user_start
+    d, groups, at = limits.least.size, limits.groups, 0
     weight = limits.joint_weight
     if number >= 2 * d:
         number -= 2 * d
-        while number >= int(inputs[at + 1]):
-            block, m = int(inputs[at]), int(inputs[at + 1])
-            size = nv if block == QDD else (k if block == FORCES else d)
-            at, number = at + 3 + m * (size + 1), number - m
-        weight = inputs[at + 2]
+        while number >= int(groups[at + 1]):
+            block, m = int(groups[at]), int(groups[at + 1])
+            at, number = at + 3 + m * (group_size(block, nv, k, d) + 1), number - m
+        weight = groups[at + 2]
     return weight if weight > 0.0 else np.inf
 
 

@@ -24,8 +24,10 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
+from floatbase import _geometry
 from floatbase.control.problem import INCONSISTENCY_TOLERANCE
 from floatbase.dynamics import CONSTRAINT_NOISE, CONSTRAINT_RANK_TOLERANCE
+from floatbase.dynamics._compiled import MIN_TILT
 from floatbase.qp import FEASIBILITY_TOLERANCE
 from floatbase.robots import UNIT_NORM_TOLERANCE
 
@@ -54,17 +56,18 @@ cache_error = ""  # why compiled code cannot be kept on disk
 
 
 def source_digest(folder: Path = Path(__file__).parent) -> int:
-    """Return a digest of this folder's text and of the imported constants that are compiled in."""
+    """Return a digest of this folder's text, and of all that is imported and compiled in."""
     text = repr(
         (
             INCONSISTENCY_TOLERANCE,
             CONSTRAINT_RANK_TOLERANCE,
             CONSTRAINT_NOISE,
             FEASIBILITY_TOLERANCE,
+            MIN_TILT,
             UNIT_NORM_TOLERANCE,
         )
     ).encode()
-    for file in sorted(folder.glob("*.py")):
+    for file in (Path(_geometry.__file__), *sorted(folder.glob("*.py"))):
         text += file.name.encode() + file.read_bytes()
     return int.from_bytes(sha256(text).digest()[:7], "big")
 

@@ -7,19 +7,25 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from floatbase.control.tick.dynamics import Bodies, point_velocity
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.problem_arrays import POINT, USER_DEFINED
+from floatbase.control.tick.problem_arrays import DRIVEN_FRAME, FLAT, POINT, USER_DEFINED, WHEEL
 from floatbase.control.tick.vectors import (
+    across,
     cross,
+    dot,
     minus,
     plus,
     rotate,
     rotation_in,
     row_part,
     times,
+    write_row,
 )
 from floatbase.control.tick.workspace import clear
+from floatbase.dynamics._compiled import MIN_TILT
 
 
 class ContactTable(NamedTuple):
@@ -28,12 +34,16 @@ class ContactTable(NamedTuple):
     # (C, 7), joint, kind, first point, number of points, of motion rows, of entries of λ, and 1 if
     # the controller assumes that its forces have no effect
     table: Any
-    frames: Any  # (C, 16), pose of the frame in the joint (12), normal in the world, radius
-    points: Any  # (P, 3), centre of the ball, or corners, in the frame
+    # (C, 19), pose of the frame in the joint (12), normal in the world, radius, axle in the frame
+    frames: Any
+    # (P, 4), centre of the ball or wheel, or corners, in the frame; where in λ its force starts
+    points: Any
     inputs: Any  # packed by `user_terms.UserTerms`
-    # where the user-defined contacts' A, b and J start in it, one contact after another
+    # where the numbers of contacts start in it, one contact after another: A, b, J and positions of
+    # user-defined ones, accelerations of driven frames
     user_start: Any
-    points_only: Any  # whether all are point contacts with an effect: their A and J are the same
+    same_rows: Any  # whether A and J are the same
+    positions: Any  # (P, 3), memory for the positions of the points, world
 
 
 @jit
@@ -64,6 +74,29 @@ def body_jacobian(bodies: Bodies, joint, linear, p, out, row, factor=1.0):
 
 
 @jit
+def frame_jacobian(bodies: Bodies, joint, p, n_rows, out, row):
+    """Add the Jacobian of a frame at p to out (·, nv): linear rows, then angular if n_rows = 6."""
+    body_jacobian(bodies, joint, True, p, out, row)
+    if n_rows == 6:
+        body_jacobian(bodies, joint, False, p, out, row + 3)
+
+
+@jit
+def wheel_direction(R, axis, normal, omega):
+    """Return u from the lowest point of a wheel to its centre, u̇, and False if it lies on its side.
+
+    R, omega: rotation and angular velocity of the frame. axis: axle in the frame, a unit vector.
+    """
+    axle = rotate(R, axis)
+    rate = cross(omega, axle)
+    w, along = across(axle, normal), dot(normal, axle)
+    length = np.sqrt(dot(w, w))
+    u = times(1.0 / length, w)
+    w_rate = times(-1.0, plus(times(dot(normal, rate), axle), times(along, rate)))
+    return u, times(1.0 / length, across(u, w_rate)), length >= MIN_TILT
+
+
+@jit
 def copy_rows(numbers, first, n_rows, n_columns, out, row):
     """Copy a table (n_rows, n_columns) from `numbers` into `out`, and return where it ends.
 
@@ -77,9 +110,9 @@ def copy_rows(numbers, first, n_rows, n_columns, out, row):
 
 @jit
 def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
-    """Write A (m, nv), b (m,) of (5) and J (k, nv) of (4) for all contacts.
+    """Write A (m, nv), b (m,) of (5), J (k, nv) of (4) and the positions of all contacts.
 
-    A and J are the same array if `points_only`.
+    A and J are the same array if `same_rows`. Returns False if a wheel lies flat on its side.
     """
     row, force, nv, inputs, start = 0, 0, A.shape[1], contacts.inputs, contacts.user_start
     clear(A)
@@ -93,30 +126,45 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             for r in range(m):
                 b[row + r] = inputs[start + r]
             start = copy_rows(inputs, start + m, k, nv, J, force)
+            start = copy_rows(inputs, start, count, 3, contacts.positions, first)
             row, force = row + m, force + k
             continue
         R, p = frame_pose(bodies, joint, contacts.frames, i)
-        normal, radius = row_part(contacts.frames, i, 12), contacts.frames[i, 15]
+        up, up_rate, radius = (
+            row_part(contacts.frames, i, 12),
+            (0.0, 0.0, 0.0),
+            contacts.frames[i, 15],
+        )
+        omega = row_part(bodies.velocity, joint, 3)
+        if kind == WHEEL:
+            axis = row_part(contacts.frames, i, 16)
+            up, up_rate, has_lowest_point = wheel_direction(R, axis, up, omega)
+            if not has_lowest_point:
+                return False
         for j in range(first, first + count):
-            point = minus(
-                plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, normal)
-            )
-            body_jacobian(bodies, joint, True, point, J, force + 3 * (j - first))
-            if kind == POINT:
+            point = minus(plus(p, rotate(R, row_part(contacts.points, j, 0))), times(radius, up))
+            write_row(contacts.positions, j, 0, point)
+            if kind == FLAT:
+                body_jacobian(bodies, joint, True, point, J, force + 3 * (j - first))
+            else:
                 p = point
-        if not contacts.points_only:
-            body_jacobian(bodies, joint, True, p, A, row)
+        if kind != FLAT:
+            frame_jacobian(bodies, joint, p, k, J, force)
+        if not contacts.same_rows:
+            frame_jacobian(bodies, joint, p, m, A, row)
         _, drift = point_velocity(bodies, joint, p)
-        if kind == POINT:  # the ball rolls: its lowest point moves on the ball
-            angular = row_part(bodies.velocity, joint, 3)
-            drift = plus(drift, times(radius, cross(angular, cross(angular, normal))))
-        else:
-            body_jacobian(bodies, joint, False, p, A, row + 3)
-            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
+        if kind in (POINT, WHEEL):  # it rolls: its lowest point moves on the body
+            drift = plus(drift, times(radius, cross(omega, minus(cross(omega, up), up_rate))))
+        if kind == DRIVEN_FRAME:
+            drift = minus(drift, (inputs[start], inputs[start + 1], inputs[start + 2]))
+            start += 3
         b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
+        if m == 6:
+            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
         row, force = row + m, force + k
     force = 0
     for i in range(contacts.table.shape[0]):
         if contacts.table[i, 6] == 1:
             clear(J[force : force + contacts.table[i, 5]])
         force += contacts.table[i, 5]
+    return True

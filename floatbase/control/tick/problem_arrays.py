@@ -17,27 +17,55 @@ from floatbase._validation import Array
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import BLOCKS, hard_maximum
 from floatbase.control.problem import AssumedModel, Problem, assumed_model
+from floatbase.control.soft import ContactMotionTask, SoftConstraint
 from floatbase.control.tick.targets import TargetLayout
-from floatbase.dynamics import FlatFootContact, FrictionContact, MotionConstraint, PointContact
+from floatbase.dynamics import (
+    FlatFootContact,
+    FrictionContact,
+    LinearConstraint,
+    MotionConstraint,
+    PointContact,
+    RollingWheel,
+)
+from floatbase.dynamics._compiled import FrameMotion
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import AxisTask
 from floatbase.robots import Robot
 
-POINT, FLAT, USER_DEFINED = range(3)
-CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT}
+# of contacts; the last two have numbers in each tick's inputs
+POINT, FLAT, WHEEL, FIXED_FRAME, DRIVEN_FRAME, USER_DEFINED = range(6)
+CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT, RollingWheel: WHEEL}
 QDD, TAU, FORCES = range(len(BLOCKS))
+CAPTURE_POINT = len(BLOCKS)  # of a group of rows that the tick computes itself
 _POSE_SIZE = 12  # numbers of a pose: rotation column by column, then position
+_FRAME_SIZE = _POSE_SIZE + 7  # of `ContactTable.frames`
 # entries of `sizes`: numbers of joints, contacts, points, rows of eq. (5), rows of one cone
 # (its facets and the minimum normal force), rows of `TaskTable`, driven joints, entries of λ,
 # targets, numbers of user-defined contacts, user-defined tasks, groups of user-defined inequalities
 N_JOINTS, N_CONTACTS, N_POINTS, N_MOTION_ROWS, N_CONE_ROWS, N_TASKS, N_DRIVEN = range(7)
 N_FORCES, N_TARGETS, N_CONTACT_NUMBERS, N_USER_TASKS, N_INEQUALITIES = range(7, 12)
 # then 1 or 0: A and J are equal, `Inequalities.has_optional`, there are joint limits
-POINTS_ONLY, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
+SAME_ROWS, HAS_OPTIONAL, HAS_JOINT_LIMITS = range(12, 15)
 UNDERACTUATED, HAS_CONES = range(15, 17)  # likewise, as in `AssumedModel`
 Indices: TypeAlias = npt.NDArray[np.int64]
 # facets, inner_approximation and facet_rotation of a `FrictionPolyhedron`
 PolyhedronOptions: TypeAlias = tuple[int, bool, float]
+
+
+def contact_kind(contact: MotionConstraint) -> int:
+    """Return the kind of a contact in the tables of the tick."""
+    if type(contact) is LinearConstraint and type(contact.function) is FrameMotion:
+        return FIXED_FRAME if contact.function.acceleration is None else DRIVEN_FRAME
+    return CONTACT_KINDS.get(type(contact), USER_DEFINED)
+
+
+def soft_contact_task(problem: Problem) -> ContactMotionTask | None:
+    """Return the task of soft contacts if the tick computes the rows of all, otherwise None."""
+    tasks = [task for task in problem.tasks if type(task) is ContactMotionTask]
+    rigid = [each.contact for each in problem.contacts if isinstance(each, SoftConstraint)]
+    if len(tasks) != 1 or len(rigid) < len(problem.contacts) or list(tasks[0].contacts) != rigid:
+        return None
+    return tasks[0] if all(contact_kind(each) < DRIVEN_FRAME for each in rigid) else None
 
 
 @lru_cache(maxsize=16)
@@ -62,8 +90,11 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
 
     Raises `UnknownNameError` if a frame does not exist.
     """
-    contacts, frames, points, cones = _pack_contacts(problem)
-    cones[:, 4] = np.repeat(problem.contacts.point_force_indices[::3], problem.limits.facets + 1)
+    soft = soft_contact_task(problem)
+    contacts, frames, points, cones = _pack_contacts(problem, soft)
+    forces = problem.contacts.point_force_indices[::3]
+    points = np.column_stack([points, forces])
+    cones[:, 4] = np.repeat(forces, problem.limits.facets + 1)
     tasks, gains, poses = _pack_tasks(problem, layout)
     (tree, robot_tables), limits = pack_robot(problem.robot), problem.limits
     assumed = assumed_model(problem) or AssumedModel()
@@ -71,7 +102,7 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     terms = (*gravity, assumed.mass, assumed.velocity_forces, assumed.drift)
     contacts[:, 6] = [name in assumed.ignored_contacts for name in problem.contacts.names]
     n_inequalities = len(limits.all_inequalities(problem.contacts))
-    nv, user_contacts = problem.robot.nv, contacts[contacts[:, 1] == USER_DEFINED]
+    kinds = contacts[:, 1]
     sizes = {
         N_JOINTS: len(tree),
         N_CONTACTS: len(contacts),
@@ -82,10 +113,10 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         N_DRIVEN: problem.robot.d,
         N_FORCES: problem.contacts.k,
         N_TARGETS: layout.size,
-        N_CONTACT_NUMBERS: sum(m * (nv + 1) + k * nv for m, k in user_contacts[:, 4:6]),
-        N_USER_TASKS: len(problem.tasks) - len(layout.tasks),
+        N_CONTACT_NUMBERS: contact_numbers(contacts, problem.robot.nv),
+        N_USER_TASKS: len(problem.tasks) - len(layout.tasks) - (soft is not None),
         N_INEQUALITIES: n_inequalities,
-        POINTS_ONLY: np.all(contacts[:, 1] == POINT) and not np.any(contacts[:, 6]),
+        SAME_ROWS: not np.any((kinds == FLAT) | (kinds == USER_DEFINED) | contacts[:, 6]),
         HAS_OPTIONAL: n_inequalities > 0 or np.any(hard_maximum(problem.contacts, limits)),
         HAS_JOINT_LIMITS: limits.joint_limits is not None,
         UNDERACTUATED: assumed.underactuated,
@@ -93,7 +124,7 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
     }
     float_tables = (
         terms, *robot_tables, frames, points, gains, poses, cones, limits.torque_limits,
-        *_pack_joint_limits(limits.joint_limits, problem.robot.d),
+        *_pack_joint_limits(limits.joint_limits, problem.robot.d), soft.weight if soft else 0.0,
     )  # fmt: skip
     int_tables = np.concatenate([np.ravel(table) for table in (tree, contacts, tasks)])
     return (
@@ -101,6 +132,13 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
         int_tables,
         np.concatenate([np.ravel(table) for table in float_tables]),
     )
+
+
+def contact_numbers(contacts: Indices, nv: int) -> int:
+    """Return how many of a tick's inputs are of contacts. contacts: table of `ContactTable`."""
+    user = contacts[contacts[:, 1] == USER_DEFINED]
+    matrices = sum(m * (nv + 1) + k * nv + 3 * n for n, m, k in user[:, 3:6])
+    return int(matrices + 3 * np.sum(contacts[:, 1] == DRIVEN_FRAME))
 
 
 def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array]:
@@ -112,59 +150,57 @@ def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array
     return table, np.array([limits.period, limits.weight or 0.0])
 
 
-def _pack_contacts(problem: Problem) -> tuple[Any, ...]:
-    """Return contacts (C, 7), frames (C, 16) and points (P, 3), and cones (P (F + 1), 5).
+def _pack_contacts(problem: Problem, soft: ContactMotionTask | None) -> tuple[Any, ...]:
+    """Return contacts (C, 7), frames (C, 19) and points (P, 3), and cones (P (F + 1), 5).
 
-    The first three arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
+    The first two arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
     limits = problem.limits
     found = [
         _pack_contact(problem.robot, contact, limits.polyhedron_options)
-        for contact in problem.contacts
+        for contact in (problem.contacts if soft is None else soft.contacts)
     ]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
     tables = np.array(table, np.int64).reshape(-1, 7)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
         np.concatenate([np.zeros((0, width)), *parts])
-        for width, parts in ((_POSE_SIZE + 4, frames), (3, points), (5, cones))
+        for width, parts in ((_FRAME_SIZE, frames), (3, points), (5, cones))
     )
 
 
 def _pack_contact(
     robot: Robot, contact: MotionConstraint, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
-    """Return one contact: table row, frame (1, 16), points (p, 3) and cones (p (F + 1), 5)."""
-    if type(contact) in CONTACT_KINDS:
+    """Return one contact: table row, frame (1, 19), points (p, 3) and cones (p (F + 1), 5)."""
+    if contact_kind(contact) != USER_DEFINED:
         return _pack_builtin_contact(robot, cast(Any, contact), options)
     n = 0
     cones: Array = np.zeros((0, 5))
     if isinstance(contact, FrictionContact):
         n, cones = len(contact.point_names), _cones(contact, options)
     row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k, 0)
-    return row, np.zeros((1, _POSE_SIZE + 4)), np.zeros((n, 3)), cones
+    return row, np.zeros((1, _FRAME_SIZE)), np.zeros((n, 3)), cones
 
 
 @lru_cache(maxsize=256)
 def _pack_builtin_contact(
-    robot: Robot, contact: PointContact | FlatFootContact, options: PolyhedronOptions
+    robot: Robot, contact: Any, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Return one contact of a built-in class, as `_pack_contact` does."""
-    joint, pose = _frame_placement(robot, contact.frame)
-    radius, points = (
-        (contact.radius, contact.centre)
-        if isinstance(contact, PointContact)
-        else (0.0, contact.corners)
-    )
-    points = np.array(points).reshape(-1, 3)
-    kind, n_rows = CONTACT_KINDS[type(contact)], len(contact.row_names)
-    row = (joint, kind, 0, len(points), n_rows, contact.k, 0)
-    return (
-        row,
-        np.concatenate([pose, contact.normal, [radius]])[None],
-        points,
-        _cones(contact, options),
-    )
+    kind, surface = contact_kind(contact), np.zeros(7)
+    cones: Array = np.zeros((0, 5))
+    points: Array = np.zeros((0, 3))
+    if kind in (FIXED_FRAME, DRIVEN_FRAME):
+        frame = contact.function.frame
+    else:
+        frame, cones = contact.frame, _cones(contact, options)
+        points = np.reshape(contact.corners if kind == FLAT else contact.centre, (-1, 3))
+        surface[:3], surface[3] = contact.normal, getattr(contact, "radius", 0.0)
+        surface[4:] = getattr(contact, "axis", 0.0)
+    joint, pose = _frame_placement(robot, frame)
+    row = (joint, kind, 0, len(points), len(contact.row_names), contact.k, 0)
+    return row, np.concatenate([pose, surface])[None], points, cones
 
 
 def _cones(contact: FrictionContact, options: PolyhedronOptions) -> Array:

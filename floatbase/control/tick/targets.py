@@ -17,6 +17,7 @@ from floatbase.objectives import Task
 from floatbase.objectives._task import TargetTask
 
 COM, ANGULAR_MOMENTUM, ORIENTATION, FRAME, AXIS, POSTURE, FORCE, TORQUE = range(8)
+CENTRE_OF_PRESSURE = 8
 # kind, then indices in the task's targets: of the value, from one row of it to the next, of
 # velocity and acceleration. A pose in a reference is a position and an orientation in it.
 _TASK_ROWS: Mapping[str, tuple[tuple[int, ...], ...]] = {
@@ -29,6 +30,7 @@ _TASK_ROWS: Mapping[str, tuple[tuple[int, ...], ...]] = {
     "posture": ((POSTURE, 0, 0, 0, 0),),
     "force": ((FORCE, 0, 0, 0, 0),),
     "torque": ((TORQUE, 0, 0, 0, 0),),
+    "centre of pressure": ((CENTRE_OF_PRESSURE, 0, 0, 0, 0),),
 }
 
 

@@ -2,8 +2,9 @@
 
 `compiled.py` fills the arrays and calls `tick`; README.md explains its stages. A tick without an
 answer returns a code: INVALID (a value is not finite, a quaternion has the wrong length, an
-orientation error is too large, or the target of an orientation is no rotation matrix), INACCURATE
-(the last digits are lost), INFEASIBLE. After the first two, the reference backend decides.
+orientation error is too large, a target is not valid, a wheel lies on its side, or there is no
+support polygon), INACCURATE (the last digits are lost), INFEASIBLE. After the first two, the
+reference backend decides.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase.control.tick import problem_arrays as size
-from floatbase.control.tick.costs import Cost, TaskTable, count_user_rows, task_costs
+from floatbase.control.tick.costs import Cost, TaskTable, contact_costs, count_user_rows, task_costs
 from floatbase.control.tick.dual_search import INACCURATE, dual_search
 from floatbase.control.tick.dynamics import (
     DRIFT_FACTOR,
@@ -34,7 +35,12 @@ from floatbase.control.tick.elimination import (
     parametrise,
     torques,
 )
-from floatbase.control.tick.inequalities import Inequalities, affine_value, joint_bounds
+from floatbase.control.tick.inequalities import (
+    Inequalities,
+    affine_value,
+    capture_points,
+    joint_bounds,
+)
 from floatbase.control.tick.jit import jit, jit_cached, jit_inline
 from floatbase.control.tick.kinematics import ContactTable, contact_rows
 from floatbase.control.tick.workspace import (
@@ -53,12 +59,12 @@ MAX_ENTRY = 1e8
 
 
 @jit_inline
-def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest, saturated):
-    """Return model, contacts, tasks, limits and joint limits from their flat arrays.
+def unpack(nv, sizes, int_tables, float_tables, inputs, counters, workspace, saturated):
+    """Return model, contacts, tasks, limits, joint limits and more from their flat arrays.
 
     `problem_arrays.pack_problem` and `user_terms.UserTerms` wrote the arrays. sizes: its entries
-    have names in `problem_arrays`. counters: two integers of memory. least, largest, saturated:
-    memory for `Inequalities`. int_tables, float_tables: integers and real numbers of all tables,
+    have names in `problem_arrays`. counters: two integers of memory. saturated: memory for
+    `Inequalities`. int_tables, float_tables: integers and real numbers of all tables,
     one table after another. inputs: as for `tick`.
     """
     n, d, k = sizes[size.N_JOINTS], sizes[size.N_DRIVEN], sizes[size.N_FORCES]
@@ -74,12 +80,14 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     links = read_matrix(float_tables, floats, n, MASS + 1)
     joints = read_matrix(float_tables, floats, n, 15)
     model = Model(tree, joints, links, read_vector(float_tables, floats, nv), terms)
-    frames = read_matrix(float_tables, floats, n_contacts, 16)
-    points = read_matrix(float_tables, floats, n_points, 3)
+    frames = read_matrix(float_tables, floats, n_contacts, 19)
+    points = read_matrix(float_tables, floats, n_points, 4)
     bounds = sizes[size.N_TARGETS]  # inputs: targets, bounds of normal forces, user-defined terms
     user_start = bounds + 2 * n_points
-    points_only = sizes[size.POINTS_ONLY] == 1
-    contacts = ContactTable(contact_table, frames, points, inputs, user_start, points_only)
+    contacts = ContactTable(
+        contact_table, frames, points, inputs, user_start, sizes[size.SAME_ROWS] == 1,
+        take_matrix(workspace, n_points, 3),
+    )  # fmt: skip
     gains = read_matrix(float_tables, floats, n_tasks, 3)
     user_tasks = user_start + sizes[size.N_CONTACT_NUMBERS]
     n_user_rows, user_inequalities = count_user_rows(inputs, user_tasks, n_user_tasks, nv, k, d)
@@ -88,32 +96,44 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, least, largest
     cones = read_matrix(float_tables, floats, n_points * n_rows, 5)
     torque_limits = read_vector(float_tables, floats, d)
     joint_limits = read_matrix(float_tables, floats, 6, d)
-    period, joint_limit_weight = read_vector(float_tables, floats, 2)
+    period, joint_limit_weight, contact_weight = read_vector(float_tables, floats, 3)
+    groups = take_vector(workspace, inputs.size - user_inequalities)
+    for i in range(groups.size):
+        groups[i] = inputs[user_inequalities + i]
     limits = Inequalities(
-        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, user_inequalities,
-        sizes[size.N_INEQUALITIES], sizes[size.HAS_CONES] == 1, sizes[size.HAS_OPTIONAL] == 1,
-        sizes[size.HAS_JOINT_LIMITS] == 1, least, largest, joint_limit_weight, saturated,
+        cones, n_rows - 1, n_points, torque_limits, inputs, bounds, groups,
+        sizes[size.N_INEQUALITIES], take_matrix(workspace, 3, nv + k + 1),
+        sizes[size.HAS_CONES] == 1, sizes[size.HAS_OPTIONAL] == 1,
+        sizes[size.HAS_JOINT_LIMITS] == 1, take_vector(workspace, d), take_vector(workspace, d),
+        joint_limit_weight, saturated,
     )  # fmt: skip
-    return model, contacts, tasks, limits, joint_limits, period
+    return model, contacts, tasks, limits, joint_limits, period, contact_weight
 
 
-def workspace_sizes(sizes: npt.NDArray[Any], n_user_rows: int) -> tuple[int, int]:
+def workspace_sizes(
+    sizes: npt.NDArray[Any], n_inputs: int, n_user_rows: int = 0
+) -> tuple[int, int]:
     """Return how many real numbers and how many integers a tick needs as memory.
 
-    sizes: as for `unpack`. n_user_rows: number of rows of all user-defined tasks.
+    sizes: as for `unpack`. n_inputs: size of the inputs. n_user_rows: number of rows of all
+    user-defined tasks.
     """
-    n_joints, n_tasks, m, d, k = (
+    n_joints, n_tasks, n_points, m, d, k = (
         int(sizes[entry])
-        for entry in (size.N_JOINTS, size.N_TASKS, size.N_MOTION_ROWS, size.N_DRIVEN, size.N_FORCES)
-    )
+        for entry in (
+            size.N_JOINTS, size.N_TASKS, size.N_POINTS, size.N_MOTION_ROWS, size.N_DRIVEN,
+            size.N_FORCES,
+        )
+    )  # fmt: skip
     base = 6
     nv = d + base
     n = nv + k  # and no more β than that
-    contact = bodies_size(n_joints, nv) + (k + m) * nv + m
+    contact = bodies_size(n_joints, nv) + (k + m) * nv + m + 3 * n_points
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
     space = (n + d) * (n + 1)
-    cost = (3 * n_tasks + n_user_rows + 2 * d + k + 5) * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
-    search = (n + 1) ** 2 + 4 * n * n + 8 * n + k + 3 * d + nv
+    n_rows = 3 * n_tasks + n_user_rows + m + 2 * d + k + 5
+    cost = n_rows * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
+    search = (n + 1) ** 2 + 4 * n * n + 8 * n + k + 3 * d + nv + 3 * (n + 1) + n_inputs
     return 1 + contact + elimination + space + cost + search, 3 + (m + base) + 3 * n
 
 
@@ -177,10 +197,9 @@ def make_tick(digest):
         base, n = nv - d, nv + k
         passive = base if sizes[size.UNDERACTUATED] == 1 else 0  # rows of (7) without a motor
         float_workspace[0], int_workspace[0] = 1, 1
-        least, largest = take_vector(float_workspace, d), take_vector(float_workspace, d)
-        model, contacts, tasks, limits, joint_limits, period = unpack(
-            nv, sizes, int_tables, float_tables, inputs, take_vector(int_workspace, 2), least,
-            largest, result[3 * n + d :],
+        model, contacts, tasks, limits, joint_limits, period, contact_weight = unpack(
+            nv, sizes, int_tables, float_tables, inputs, take_vector(int_workspace, 2),
+            float_workspace, result[3 * n + d :],
         )  # fmt: skip
         if not inputs_valid(q, v, inputs, model.tree):
             return INVALID
@@ -190,8 +209,12 @@ def make_tick(digest):
             return STOPPED
         M, h = bodies.M, bodies.h
         J_points, b = take_matrix(float_workspace, k, nv), take_vector(float_workspace, m)
-        A = J_points if contacts.points_only else take_matrix(float_workspace, m, nv)
-        contact_rows(bodies, contacts, A, b, J_points)
+        A = J_points if contacts.same_rows else take_matrix(float_workspace, m, nv)
+        if not contact_rows(bodies, contacts, A, b, J_points):
+            return INVALID
+        soft_A, soft_b = A[:0], b[:0]
+        if contact_weight > 0.0:
+            soft_A, soft_b, A, b, m = A, b, A[:0], b[:0], 0
         for i in range(m):
             b[i] *= model.terms[DRIFT_FACTOR]
         if stages == 2:
@@ -222,19 +245,22 @@ def make_tick(digest):
         torques(space.V, space.beta_index, M, h, J_points, base, space.T)
         if stages == 3:
             return STOPPED
-        R = take_matrix(
-            float_workspace, 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3, nb + 1
-        )
+        n_rows = soft_b.size + 3 * tasks.table.shape[0] + tasks.n_user_rows + 2 * d + k + 3
+        R = take_matrix(float_workspace, n_rows, nb + 1)
         diagonal, linear = take_vector(float_workspace, nb), take_vector(float_workspace, nb)
+        used = contact_costs(soft_A, soft_b, contact_weight, space, R)
         used = task_costs(
-            q, v, bodies, tasks, space, base, float_workspace, Cost(R, diagonal, linear)
-        )
+            q, v, bodies, contacts, tasks, space, base, float_workspace, Cost(R, diagonal, linear),
+            used,
+        )  # fmt: skip
         if used < 0:
             return INVALID
         if stages == 4:
             return STOPPED
         if limits.has_joint_limits:
-            joint_bounds(q, v, model.tree, joint_limits, period, least, largest)
+            joint_bounds(q, v, model.tree, joint_limits, period, limits.least, limits.largest)
+        if not capture_points(limits, bodies, contacts.positions, space):
+            return INVALID
         beta, active = take_vector(float_workspace, nb), take_vector(int_workspace, nb)
         mu = result[n + d : n + d + nb]
         n_active = dual_search(

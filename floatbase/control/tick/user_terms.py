@@ -4,22 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from floatbase._validation import Array, read_only
+from floatbase._validation import Array, as_array, read_only
 from floatbase.affine import Affine
-from floatbase.control.limits import BLOCKS
+from floatbase.control.capture_point import CapturePointRows
+from floatbase.control.limits import BLOCKS, LinearInequality
 from floatbase.control.problem import Problem, residual_of
-from floatbase.control.tick.problem_arrays import CONTACT_KINDS
+from floatbase.control.tick.problem_arrays import (
+    CAPTURE_POINT,
+    DRIVEN_FRAME,
+    USER_DEFINED,
+    contact_kind,
+    soft_contact_task,
+)
 from floatbase.control.tick.targets import compiled_rows
-from floatbase.dynamics import EquationsOfMotion, constraint_and_jacobian, equations_of_motion
+from floatbase.dynamics import (
+    EquationsOfMotion,
+    FrictionContact,
+    constraint_and_jacobian,
+    equations_of_motion,
+)
 from floatbase.errors import InputError
 from floatbase.robots import State
 
 UNBOUNDED = 1e300  # N, for inf among numbers that must be finite
+# rows of an inequality: their numbers as `inequalities.Inequalities` describes them; G and h, or
+# None if the tick computes them
+Group: TypeAlias = tuple[Array, tuple[Array, Array] | None]
+_NO_ROWS: Group = np.zeros(3), (np.zeros((0, 0)), np.zeros(0))
 
 
 class TickInputs(NamedTuple):
@@ -29,33 +45,50 @@ class TickInputs(NamedTuple):
     # and rows
     packed: Array
     n_user_rows: int = 0  # of all user-defined tasks
-    contacts: Sequence[tuple[Array, Array, Array]] = ()  # A, b and J of each user-defined contact
+    # A, b and J of each user-defined contact, accelerations of each driven frame
+    contacts: Sequence[tuple[Array, ...]] = ()
     # weight and residual of user-defined tasks, by their index in the problem
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType({})
     # minimum and maximum of each point, (P,)
     normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
-    inequalities: Sequence[tuple[Array, Array]] = ()  # G and h of user-defined rows
+    # G and h of user-defined rows, None for rows that the tick computes
+    inequalities: Sequence[tuple[Array, Array] | None] = ()
 
 
 class UserTerms:
-    """User-defined objects of a problem, which the problem arrays do not contain."""
+    """User-defined objects of a problem, which the problem arrays do not contain.
+
+    Raises `InputError` if an inequality with constant coefficients does not fit the problem.
+    """
 
     def __init__(self, problem: Problem):
         self._problem, self._limits = problem, problem.limits
+        soft = soft_contact_task(problem)
         self._tasks = [
             (i, task, BLOCKS.index(task.block))
             for i, task in enumerate(problem.tasks)
-            if not compiled_rows(task)
+            if not compiled_rows(task) and task is not soft
         ]
-        self._contacts = [
-            contact for contact in problem.contacts if type(contact) not in CONTACT_KINDS
+        kinds = [(contact, contact_kind(contact)) for contact in problem.contacts]
+        self._contacts = [each for each in kinds if each[1] >= DRIVEN_FRAME and soft is None]
+        self._inequalities = [
+            (each, _fixed_group(problem, each))
+            for each in self._limits.all_inequalities(problem.contacts)
         ]
-        self._inequalities = self._limits.all_inequalities(problem.contacts)
-        self.any = bool(self._tasks or self._contacts or self._inequalities)
+        groups = [fixed or _NO_ROWS for _, fixed in self._inequalities]
+        self._fixed_numbers, self._fixed_rows = (
+            [each[0] for each in groups],
+            [each[1] for each in groups],
+        )
+        functions = [each for each, fixed in self._inequalities if fixed is None]
+        self.any = bool(self._tasks or self._contacts or functions)
+        self._needs_state = {kind for _, kind in self._contacts} != {DRIVEN_FRAME} or bool(
+            self._tasks or functions
+        )
         self.varies = self.any or self._limits.time_varying
-        self.names = [contact.name for contact in self._contacts]
+        self.names = [contact.name for contact, kind in self._contacts if kind == USER_DEFINED]
         self.names += [task.name for _, task, _ in self._tasks]
-        self.names += [each.name for each in self._inequalities]
+        self.names += [each.name for each in functions]
         bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
         self._constant_bounds = (
             (bounds[0], bounds[1])
@@ -64,19 +97,17 @@ class UserTerms:
         )
         self._finite_bounds = _finite(self._constant_bounds)
 
-    def zero_inputs(self, targets: Array) -> TickInputs:
-        """Return targets, constant bounds of normal forces, and zeros for the user-defined terms.
+    def constant_inputs(self, targets: Array, n_contact_numbers: int) -> TickInputs:
+        """Return targets and all that is constant, and zeros for what functions return.
 
         There are as many zeros as a tick without a state needs.
         """
-        nv = self._problem.robot.nv
-        contact_size = sum(
-            len(contact.row_names) * (nv + 1) + contact.k * nv for contact in self._contacts
-        )
-        zeros = np.zeros(contact_size + 3 * len(self._tasks) + 3 * len(self._inequalities))
+        zeros = np.zeros(n_contact_numbers + 3 * len(self._tasks))
+        packed = [targets, *self._finite_bounds, zeros, *self._fixed_numbers]
         return TickInputs(
-            np.concatenate([targets, *self._finite_bounds, zeros]),
+            np.concatenate(packed),
             normal_forces=self._constant_bounds,
+            inequalities=self._fixed_rows,
         )
 
     def inputs(self, targets: Array, q: Array, v: Array, t: float) -> TickInputs:
@@ -91,17 +122,29 @@ class UserTerms:
             finite = _finite(bounds)
         packed: list[npt.ArrayLike] = [targets, *finite]
         if not self.any:
-            return TickInputs(np.concatenate(packed), normal_forces=bounds)
-        state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
-        eom = EquationsOfMotion(state, problem.contacts, t)
-        contacts = []
+            packed += self._fixed_numbers
+            return TickInputs(
+                np.concatenate(packed), normal_forces=bounds, inequalities=self._fixed_rows
+            )
+        contacts = list[tuple[Array, ...]]()
         residuals = {}
         n_user_rows = 0
         inequalities = []
-        for contact in self._contacts:
+        eom: Any = None
+        if self._needs_state:
+            state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
+            eom = EquationsOfMotion(state, problem.contacts, t)
+        for contact, kind in self._contacts:
+            if kind == DRIVEN_FRAME:
+                contacts.append((cast(Any, contact).function.acceleration_at(t),))
+                packed += contacts[-1]
+                continue
             A, b, J = constraint_and_jacobian(contact, eom.state, t)
             contacts.append((A, b, J))
             packed += A.ravel(), b, J.ravel()
+            if isinstance(contact, FrictionContact):
+                shape = len(contact.point_names), 3
+                packed.append(as_array("positions", contact.positions(eom.state), shape).ravel())
         for i, task, block in self._tasks:
             residual, weight = residual_of(task, eom, t), float(task.weight)
             if not weight >= 0.0:
@@ -109,12 +152,10 @@ class UserTerms:
             residuals[i], A, b = (weight, residual), residual.A, residual.b
             n_user_rows += len(b)
             packed += (block, len(b), weight), A.ravel(), b
-        for each in self._inequalities:
-            G, h = each.at(eom, t)
-            if each.row_names:
-                each.labels(len(h))  # raises if their number does not match
-            inequalities.append((G, h))
-            packed += (BLOCKS.index(each.block), len(h), each.weight or 0.0), G.ravel(), h
+        for each, fixed in self._inequalities:
+            numbers, rows = fixed or _group(each, eom, t)
+            packed.append(numbers)
+            inequalities.append(rows)
         return TickInputs(
             np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
         )
@@ -124,15 +165,38 @@ class UserTerms:
         contacts = self._problem.contacts
         if not self._contacts:
             return equations_of_motion(state, contacts, t)
-        user_contacts = iter(inputs.contacts)
-        rows = [
-            constraint_and_jacobian(contact, state, t)
-            if type(contact) in CONTACT_KINDS
-            else next(user_contacts)
-            for contact in contacts
-        ]
+        given, rows = iter(inputs.contacts), list[tuple[Array, ...]]()
+        for contact, kind in ((each, contact_kind(each)) for each in contacts):
+            if kind < DRIVEN_FRAME:
+                rows.append(constraint_and_jacobian(contact, state, t))
+            elif kind == USER_DEFINED:
+                rows.append(next(given))
+            else:
+                A, b = cast(Any, contact).function.rows(state, *next(given))
+                rows.append((A, b, A))
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
         return EquationsOfMotion(state, contacts, t, A=A, b=b, J=J)
+
+
+def _group(each: LinearInequality, eom: EquationsOfMotion, t: float = 0.0) -> Group:
+    """Return the rows of an inequality at a state."""
+    G, h = each.at(eom, t)
+    if each.row_names:
+        each.labels(len(h))  # raises if their number does not match
+    header = (BLOCKS.index(each.block), len(h), each.weight or 0.0)
+    return np.concatenate([header, G.ravel(), h]), (G, h)
+
+
+def _fixed_group(problem: Problem, each: LinearInequality) -> Group | None:
+    """Return the rows of an inequality if they need no function at each step, otherwise None."""
+    given, n = each.coefficients, problem.contacts.n_points
+    if type(given) is CapturePointRows:
+        parameters = given.margin, given.horizon, problem.robot.gravity
+        header = (CAPTURE_POINT, n, each.weight or 0.0, *parameters)
+        return np.append(header, np.zeros(max(3 * n - 3, 0))), None
+    if callable(given):
+        return None
+    return _group(each, EquationsOfMotion(problem.robot.standing(), problem.contacts))
 
 
 def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:

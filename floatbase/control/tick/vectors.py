@@ -57,6 +57,12 @@ def cross(a, b):
 
 
 @jit
+def across(n, x):
+    """Return x - n (n · x), the part of x across a unit vector n."""
+    return minus(x, times(dot(n, x), n))
+
+
+@jit
 def rotate(R, a):
     """Return R a."""
     return plus(plus(times(a[0], R[0]), times(a[1], R[1])), times(a[2], R[2]))
