@@ -62,15 +62,10 @@ from floatbase.qp import QP, solve
 from floatbase.robots import Robot, State, catalogue, load, load_mjcf, load_urdf
 
 if TYPE_CHECKING:
-    from floatbase.simulation import (
-        Ground,
-        Push,
-        Rollout,
-        Simulation,
-        push_recovery,
-        rollout,
-        sweep,
-    )
+    from floatbase.simulation import Ground, Push, Rollout, Simulation
+    from floatbase.simulation.push_recovery import push_recovery
+    from floatbase.simulation.rollout import rollout
+    from floatbase.simulation.sweep import sweep
     from floatbase.viewer import Viewer
 
 __version__ = "0.1.0"
