@@ -175,6 +175,7 @@ class CommandBatch(Value):
     softened: npt.NDArray[np.bool_]
 
     @property
-    def unsolved(self) -> npt.NDArray[np.intp]:
+    def unsolved(self) -> tuple[int, ...]:
         """Numbers of the rows without an answer."""
-        return np.flatnonzero(np.isin(self.status, ("infeasible", "failed")))
+        rows = np.flatnonzero(np.isin(self.status, ("infeasible", "failed")))
+        return tuple(rows.tolist())

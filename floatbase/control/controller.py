@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,17 +10,19 @@ from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 import numpy as np
 import numpy.typing as npt
 
+from floatbase._blas import one_blas_thread
 from floatbase._validation import (
     MAX_MAGNITUDE,
     Array,
     as_array,
-    as_integer,
     as_number,
     cached_property,
     numeric_copy,
+    one_or_each,
     read_only,
     refuse_new_attributes,
 )
+from floatbase.control.batch import solve_batch, thread_count
 from floatbase.control.command import Command, CommandBatch
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality, NormalForces
@@ -40,14 +41,13 @@ from floatbase.control.tick import (
     unsupported_reason,
 )
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
+from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
-_MAX_THREADS = 1024  # a larger number is a typing error
 
 
 class _Settings(NamedTuple):
@@ -474,6 +474,7 @@ class WholeBodyController:
                 return command
         return None
 
+    @one_blas_thread()  # also for the checks: several threads take 4 ms for 80,000 numbers
     def batch(
         self,
         Q: npt.ArrayLike,
@@ -524,47 +525,12 @@ class WholeBodyController:
         # copies in the form that the compiled loop needs
         Q = np.array(as_array("Q", Q, (None, self.robot.nq)), order="C")
         V = np.array(as_array("V", V, (len(Q), self.robot.nv)), order="C")
-        times = np.broadcast_to(_one_or_each("t", t, len(Q), ()), len(Q))
+        times = np.broadcast_to(one_or_each("t", t, len(Q), ()), len(Q))
         if targets is not None:
-            targets = _one_or_each("targets", targets, len(Q), (self._layout.size,))
-        if threads is None:
-            has_affinity = hasattr(os, "sched_getaffinity")  # not on macOS and Windows
-            threads = (len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count()) or 1
-        threads = as_integer("threads", threads, 1, _MAX_THREADS)
-        return self._solved_batch(Q, V, times, targets, threads)
-
-    def _solved_batch(
-        self, Q: Array, V: Array, times: Array, targets: Array | None, n_threads: int
-    ) -> CommandBatch:
-        """Return the commands of many states: compiled, then one by one what is left."""
-        n, nv, d, tick = len(Q), self.robot.nv, self.robot.d, self._compiled
-        x = np.full((n, nv + d + self.contacts.k), np.nan)  # q̈, τ, λ
-        status, softened, undecided = np.full(n, "infeasible"), np.full(n, False), np.full(n, True)
-        if tick is not None:
-            results, codes = tick.run_batch(Q, V, times, targets, n_threads)
-            undecided = codes < 0
-            x[~undecided], status[~undecided] = results[~undecided], "compiled"
-            if not self._softer_controllers:
-                undecided &= codes != tick.infeasible
-        for i in np.flatnonzero(undecided):
-            of_row = targets[i] if targets is not None and targets.ndim == 2 else targets
-            try:
-                command = self.attempt(Q[i], V[i], float(times[i]), of_row)
-            except SolverError:
-                status[i] = "failed"
-                continue
-            except InputError as error:
-                raise InputError(f"State {i} of the batch: {error}") from error
-            except Exception as error:  # of user code
-                error.add_note(f"This happened at state {i} of the batch.")
-                raise
-            if command is not None:
-                x[i] = np.concatenate([command.qdd, command.tau, command.forces])
-                status[i], softened[i] = command.backend, command.softened
-        for array in (x, status, softened):
-            array.setflags(write=False)
-        qdd, tau, forces = np.split(x, [nv, nv + d], axis=1)
-        return CommandBatch(tau, qdd, forces, status, softened)
+            targets = one_or_each("targets", targets, len(Q), (self._layout.size,))
+        n_threads = thread_count(threads)
+        may_soften = bool(self._softer_controllers)
+        return solve_batch(self, may_soften, Q, V, times, targets, n_threads)
 
     def _checked_inputs(
         self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
@@ -709,13 +675,6 @@ class WholeBodyController:
             f"WholeBodyController({self.robot.name}, {len(self.contacts)} contacts, "
             f"{len(self._problem.tasks)} tasks, {self.backend})"
         )
-
-
-def _one_or_each(name: str, value: object, n: int, shape: tuple[int, ...]) -> Array:
-    """Return an array of this shape, for all of n states, or one for each state."""
-    array = numeric_copy(value)
-    for_each = array is not None and array.ndim > len(shape)
-    return as_array(name, value, (n, *shape) if for_each else shape)
 
 
 def _check_choice(name: str, value: object, choices: object) -> None:

@@ -119,7 +119,7 @@ def test_states_that_the_compiled_step_refuses_go_to_the_reference_backend():
 
 def test_an_empty_batch_has_rows_of_the_right_length():
     batch = made().batch(np.empty((0, 19)), np.empty((0, 18)))
-    assert batch.tau.shape == (0, 12) and batch.unsolved.size == 0
+    assert batch.tau.shape == (0, 12) and batch.unsolved == ()
 
 
 def changed(array, row, value):
