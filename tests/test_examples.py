@@ -35,7 +35,7 @@ def wbc():
 
 def run(name, **settings):
     """Call the main function of an example."""
-    runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**settings)
+    return runpy.run_path(str(EXAMPLES / f"{name}.py"))["main"](**settings)
 
 
 def test_examples_are_short_enough_for_one_sitting():
@@ -130,3 +130,20 @@ def test_the_push_recovery_example_prints_and_draws_a_map(tmp_path, capsys, monk
     printed = re.findall(r"(\d+)° +(\d+) N", capsys.readouterr().out)
     assert printed == [("0", "100"), ("120", "200"), ("240", "200")]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_demonstrations_are_states_of_the_simulation_and_torques_of_the_controller(capsys):
+    q, v, tau = run("demonstrations", robots=8, steps=5)
+    speed, simulation = re.findall(r"\d+", capsys.readouterr().out)
+    assert int(speed) > 0 and 0 < int(simulation) < 100
+    robot = judges.load("go2")
+    sim, tasks = fb.Simulation(robot), fb.standing_tasks(robot.standing())
+    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks)
+    for i in range(8):
+        sim.reset(fb.State(robot, q[0, i], v[0, i]))
+        for step in range(4):
+            assert np.array_equal(controller(q[step, i], v[step, i]).tau, tau[step, i])
+            sim.step(tau[step, i])
+            sim.step(tau[step, i])
+            assert np.allclose(sim.q, q[step + 1, i], atol=1e-6)
+            assert np.allclose(sim.v, v[step + 1, i], atol=1e-4)

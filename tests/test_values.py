@@ -55,7 +55,7 @@ def arrays_of(value):
 def same(a, b):
     """Whether two values hold the same numbers and texts, at whatever depth."""
     if isinstance(a, np.ndarray):
-        return np.array_equal(a, b, equal_nan=True)
+        return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
     if isinstance(a, Mapping):
         return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     if isinstance(a, (tuple, list)):

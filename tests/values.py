@@ -86,6 +86,7 @@ def values() -> dict[str, Any]:
         "FrictionCone": FrictionCone(UP, 0.7), "FrictionPolyhedron": FrictionPolyhedron(UP, 0.7),
         "Decomposition": decompose([5.0, 0.0, 1.0], UP), "WrenchSet": wrench_set(state, contacts),
         "Command": command,
+        "CommandBatch": control.batch([state.q], [state.v]),
         "AnalyticCommand": AnalyticController(robot, contacts, state)(state.q, state.v),
         "Rollout": record(),
         "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(),

@@ -2,13 +2,13 @@
 
 from floatbase.control.analytic import AnalyticController
 from floatbase.control.capture_point import capture_point_inequality
-from floatbase.control.command import Command
+from floatbase.control.command import Command, CommandBatch
 from floatbase.control.controller import WholeBodyController
 from floatbase.control.joint_limits import JointLimits
 from floatbase.control.limits import Limits, LinearInequality
 from floatbase.control.problem import Problem, build_qp
 
 __all__ = [
-    "AnalyticController", "Command", "JointLimits", "Limits", "LinearInequality", "Problem",
-    "WholeBodyController", "build_qp", "capture_point_inequality",
+    "AnalyticController", "Command", "CommandBatch", "JointLimits", "Limits", "LinearInequality",
+    "Problem", "WholeBodyController", "build_qp", "capture_point_inequality",
 ]  # fmt: skip

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from floatbase._validation import Array, Value, cached_property, frozen
 from floatbase.control.joint_limits import JointLimits
@@ -149,3 +151,38 @@ class Command(Value):
             f"|forces|={np.linalg.norm(self.forces):.3g} N, "
             f"{len(self.active)} active inequalities, {self.backend})"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class CommandBatch(Value):
+    """Answers of `WholeBodyController.batch`, one row for each of N states.
+
+    A row without an answer is NaN. The class is immutable, and its arrays are read-only.
+
+    Parameters
+    ----------
+    tau : ndarray, shape (N, d)
+        Joint torques to apply [N·m].
+    qdd : ndarray, shape (N, nv)
+        Generalized accelerations planned with them, as in `Command`.
+    forces : ndarray, shape (N, k)
+        Contact forces planned with them, as in `Command` [N].
+    status : ndarray of str, shape (N,)
+        "compiled" or "reference" is the backend that answered. "infeasible" means that the QP has
+        no solution, and "failed" that the solver stopped without one. A call of the controller with
+        this state raises an exception with the reasons.
+    softened : ndarray of bool, shape (N,)
+        Whether limits, or limits and contacts, were made soft because the QP had no solution.
+    """
+
+    tau: Array
+    qdd: Array
+    forces: Array
+    status: npt.NDArray[np.str_]
+    softened: npt.NDArray[np.bool_]
+
+    @property
+    def unsolved(self) -> tuple[int, ...]:
+        """Numbers of the rows without an answer."""
+        rows = np.flatnonzero(np.isin(self.status, ("infeasible", "failed")))
+        return tuple(rows.tolist())

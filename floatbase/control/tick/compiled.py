@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from threading import Event, Thread, local
@@ -29,6 +30,9 @@ from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
 _RECHECK_INTERVAL = 1.0  # s between two checks whether numba is compiling
+# how many states of a batch a thread takes at a time: enough to be worth a thread, and few enough
+# to share the work evenly
+_MIN_CHUNK, _MAX_CHUNK = 32, 256
 
 # joints whose axes are fixed in their own frame
 _JOINTS = (
@@ -195,6 +199,61 @@ class CompiledTick:
         result, n_active = self.run(q, v, inputs, self._n_stages)
         decided = n_active >= 0 or n_active == self.infeasible
         return (result, n_active, inputs) if decided else None
+
+    def run_batch(
+        self, Q: Array, V: Array, times: Array, targets: Array | None, n_threads: int
+    ) -> tuple[Array, Indices]:
+        """Run one tick for each row of Q and V; return their (q̈, τ, λ) and their codes.
+
+        Q, V: contiguous and writable. targets: of all states, or one row for each. User functions
+        are called in this thread only.
+        """
+        from floatbase.control.tick import loop, tick
+
+        n, failed = len(Q), list[int]()
+        results, codes = np.empty((n, self.forces.stop)), np.empty(n, np.int64)
+        size = min(max(-(-n // n_threads), _MIN_CHUNK), _MAX_CHUNK)
+        chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
+        run_ticks = loop.compiled_loop(self._tick)
+        one_row_each = targets is not None and targets.ndim == 2
+
+        def inputs_of(rows: slice) -> list[TickInputs]:
+            """Return the inputs of each row, or of all rows together if they are equal."""
+            if not self._varies and targets is None:
+                return [self.default_inputs]
+            if not self.user_terms.varies and targets is not None:
+                packed = np.tile(self.default_inputs.packed, (rows.stop - rows.start, 1))
+                packed[:, : self.layout.size] = targets[rows] if one_row_each else targets
+                return [TickInputs(row) for row in packed]
+            all_inputs = []
+            for i in range(rows.start, rows.stop):
+                of_row = targets[i] if targets is not None and one_row_each else targets
+                inputs = self.inputs_at(Q[i], V[i], float(times[i]), of_row)
+                if inputs is None:
+                    failed.append(i)
+                all_inputs.append(inputs or self.default_inputs)
+            return all_inputs
+
+        def run(rows: slice, inputs: list[TickInputs]) -> None:
+            """Run the ticks of some rows, in any thread."""
+            stops = np.cumsum([each.packed.size for each in inputs])
+            starts = np.append(0, stops[:-1])
+            run_ticks(
+                self._tick, Q[rows], V[rows], np.resize(starts, rows.stop - rows.start),
+                np.resize(stops, rows.stop - rows.start), results[rows], codes[rows],
+                np.concatenate([each.packed for each in inputs]), *self.tables,
+                *self.workspace(max(each.n_user_rows for each in inputs)),
+                max(map(self.empty_result, inputs), key=len), self._n_stages,
+            )  # fmt: skip
+
+        if len(chunks) < 2 or n_threads == 1:
+            for chunk in chunks:
+                run(chunk, inputs_of(chunk))
+        else:
+            with ThreadPoolExecutor(n_threads) as pool:
+                list(pool.map(run, chunks, map(inputs_of, chunks)))
+        codes[failed] = tick.INVALID
+        return results, codes
 
     def warm_up(self) -> str:
         """Run one tick outside the loop, which compiles the code or loads it from disk."""
