@@ -35,6 +35,7 @@ from tick import OwnCoM
 
 import floatbase as fb
 from floatbase.control import JointLimits
+from floatbase.robots import Foot
 
 MU = 0.7
 # floatbase's answers; own: compiled, with a task as a user writes it
@@ -194,7 +195,7 @@ def problem(robot: str, peer: str) -> Problem:
     """The problem of that name. Point feet are taken without their balls: they touch at their
     frames.
     """
-    feet = [foot if foot.is_flat else foot.frame for foot in fb.load(robot).feet]
+    feet = [foot if foot.is_flat else Foot(foot.frame) for foot in fb.load(robot).feet]
     return Problem(fb.load(robot, feet=feet), peer)
 
 
