@@ -155,6 +155,8 @@ class CompiledTick:
             joint_weight is not None
         )
         self._sizes = self._workspace_sizes(self.tables[0], 0)
+        # without user-defined inequalities
+        self._result_size = self.forces.stop + 2 * self._n_multipliers + 2 * d * self._has_soft
 
     def workspace(self, n_user_rows: int = 0) -> tuple[Array, Indices]:
         """Return this thread's memory for one tick, with as many rows of user-defined tasks."""
@@ -222,9 +224,9 @@ class CompiledTick:
 
     def empty_result(self, inputs: TickInputs) -> Array:
         """Return an uninitialized array for the numbers of one tick."""
-        size = self.forces.stop + 2 * self._n_multipliers
-        if self._has_soft:
-            size += 2 * self._problem.robot.d + sum(len(h) for _, h in inputs.inequalities)
+        size = self._result_size
+        if self._has_soft and inputs.inequalities:
+            size += sum(len(h) for _, h in inputs.inequalities)
         return np.empty(size)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:

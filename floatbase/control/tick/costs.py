@@ -208,7 +208,6 @@ def task_costs(
     """
     R, nv, d, nb = cost.R, v.size, space.T.shape[0], cost.linear.size
     k = space.V.shape[0] - nv
-    clear(R)
     used, rows = 0, take_matrix(workspace, 3, nv)
     e_joint, e_dot_joint = take_vector(workspace, d), take_vector(workspace, d)
     # of the terms (weight / 2) (x - desired)² on single entries x of (q̈, λ, τ), and weight ×
@@ -224,6 +223,7 @@ def task_costs(
             if not valid:
                 return -1
             root = np.sqrt(w)
+            clear(R[used : used + 3])
             for r in range(3):
                 for c in range(nv):
                     rows[r, c] *= root
@@ -244,7 +244,9 @@ def task_costs(
                 weighted[first + j] += w * desired
     used = user_task_costs(used, tasks, space, nv, R)
     used = single_entry_costs(used, weights, weighted, space, cost)
-    return 4 * ((used + 3) // 4)
+    multiple = 4 * ((used + 3) // 4)
+    clear(R[used:multiple])
+    return multiple
 
 
 @jit
@@ -266,6 +268,7 @@ def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
     """Add (weight / 2) ‖A x + b‖² of user-defined tasks to R; return the number of rows in use."""
     inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
+    clear(R[used : used + tasks.n_user_rows])
     for _ in range(tasks.n_user):
         block, m, root = int(inputs[at]), int(inputs[at + 1]), np.sqrt(inputs[at + 2])
         size, at = nv if block == QDD else (k if block == FORCES else d), at + 3

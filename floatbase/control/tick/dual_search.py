@@ -53,21 +53,20 @@ class ActiveSet(NamedTuple):
 
 
 @jit
-def cholesky(H, L):
-    """Write L (nb, nb) with L Lᵀ = H; return False if the cost is flat along a direction.
+def cholesky(L):
+    """Replace H in the lower triangle of L (nb, ·) by the L with L Lᵀ = H.
 
-    Only the lower triangle of H is read.
+    Returns False if the cost is flat along a direction.
     """
     n = L.shape[0]
-    clear(L)
     for j in range(n):
         for i in range(j, n):
-            total = H[i, j]
+            total = L[i, j]
             for c in range(j):
                 total -= L[i, c] * L[j, c]
             if i > j:
                 L[i, j] = total / L[j, j]
-            elif total <= PIVOT_TOLERANCE * H[j, j]:
+            elif total <= PIVOT_TOLERANCE * L[j, j]:
                 return False
             else:
                 L[j, j] = np.sqrt(total)
@@ -360,7 +359,7 @@ def dual_search(
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
     H, grad = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb)
-    L = take_matrix(workspace, nb, nb)
+    L = H[:nb]
     W, U = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
     rows = take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
@@ -372,7 +371,7 @@ def dual_search(
     has_soft = limits.saturated.size > 0
     clear(limits.saturated)
     hessian(cost, H, grad)
-    if not cholesky(H, L):
+    if not cholesky(L):
         return INACCURATE
     solve_cholesky(L, grad, beta)
     q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False
