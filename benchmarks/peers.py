@@ -26,27 +26,25 @@ from harness import ROBOTS, SPREADS, microseconds
 from peer_environments import MissingError, python_of, versions
 from peer_problems import LIMITED
 from peer_wire import Process
-from tick import JOINT_LIMITS
 
 HERE = Path(__file__).parent
+JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
-PLANAR = "placo planar"  # placo's own flat foot, an easier problem
 RUNS = {  # our way, whom it is measured beside, robots
     "tsid": (
         ("compiled", "tsid", ROBOTS),
-        ("own", "tsid", ROBOTS),
         ("reference", "tsid", ("go2",)),
         *(("compiled", limited, ROBOTS) for limited in LIMITED),
     ),
-    "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
+    "placo": (("compiled", "placo", ROBOTS),),
 }
 
 
 @dataclass(frozen=True)
 class Row:
-    """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
+    """One of our backends, one robot, one peer, one kind of states.
 
     unanswered: states without an answer, ours and theirs. differences: of the torques in each state
     [N·m]; up to `tolerance`, they count as none. within: the largest difference between our way and
@@ -66,7 +64,7 @@ class Row:
     ours: np.ndarray
     theirs: np.ndarray
     ratios: np.ndarray
-    stages: dict[str, float]
+    is_cold: bool = False
 
     @property
     def difference(self) -> float:
@@ -115,13 +113,19 @@ def compare(
     for process in pair:
         process.ask("states", states)
     # every turn has all rows, so that a slow second of the machine does not fall on one row
-    turns = [
-        {label: [process.ask("clock", label) for process in pair] for label in SPREADS}
-        for _ in range(rounds)
-    ]
-    for label in SPREADS:
+    clocks = {"clock": rounds}
+    if way == "compiled" and peer in PACKAGES:
+        clocks["cold"] = max(1, rounds // 20)  # each tick waits for 16 MB
+    turns = {
+        clock: [
+            {label: [process.ask(clock, label) for process in pair] for label in SPREADS}
+            for _ in range(n_turns)
+        ]
+        for clock, n_turns in clocks.items()
+    }
+    for label, clock in product(SPREADS, clocks):
         ours, theirs = ([np.array(torques[i]) for i in kept[label]] for torques in found[label])
-        times = np.array([turn[label] for turn in turns])
+        times = np.array([turn[label] for turn in turns[clock]])
         medians = np.median(times, axis=2)
         yield Row(
             way,
@@ -136,7 +140,7 @@ def compare(
             ours=times[:, 0].ravel(),
             theirs=times[:, 1].ravel(),
             ratios=medians[:, 0] / medians[:, 1],
-            stages=pair[1].ask("stages", label),
+            is_cold=clock == "cold",
         )
 
 
@@ -149,7 +153,7 @@ def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: 
     """The largest difference from floatbase's reference backend on some of the states, N·m, where
     that says who rounds.
     """
-    if problem.peer == PLANAR or not states:
+    if not states:
         return np.nan
     reference = problem.controller("reference")
     return float(np.max(_differences(ours[::5], [reference(q, v).tau for q, v in states[::5]])))
@@ -195,17 +199,6 @@ def time_table(rows: Sequence[Row], name: str = "floatbase") -> str:
             [row.robot, row.peer, row.label]
             + microseconds(np.percentile([row.ours, row.theirs], [50, 99], axis=1).T.ravel())
             + [f"**{row.ratio:.2f}**", row.middle]
-            for row in rows
-        ),
-    )
-
-
-def stage_table(rows: Sequence[Row]) -> str:
-    return harness.table(
-        "robot | peer | states | time of each call",
-        (
-            [row.robot, row.peer, row.label]
-            + [", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())]
             for row in rows
         ),
     )
@@ -267,13 +260,9 @@ torques, in Python, through each library's own binding: `computeProblemData`, `s
 floatbase. The peers are the packages on PyPI, compiled for any processor of the architecture. numba
 compiles floatbase's control step for the processor in use."""
 
-OWN = """\
-floatbase accepts tasks written in Python. TSID's binding accepts only its own classes:
-`addMotionTask` has an overload for each of them, and C++ never calls what a Python subclass
-overrides, so a custom task has to be written in C++. These rows therefore do not compare the same
-thing; they show the cost of a task in Python. The problem is the one above, but floatbase's task
-for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every control step,
-while TSID uses its `TaskComEquality`."""
+COLD = """\
+A controller runs between other work, which replaces the contents of the processor's caches. Here,
+16 MB are written before each control step of both libraries. The time does not include this."""
 
 LIMITS = """\
 The problem is the one above, with hard joint limits: `TaskJointPosVelAccBounds` in TSID,
@@ -297,18 +286,14 @@ floatbase's compiled and reference backends, which share no solver, agree more c
 fifth state)."""
 
 
-PLANAR_FEET = """\
-placo's own flat foot has six variables instead of twelve and no limit on the moment about its
-normal, so its problem is easier. Its torques equal those of floatbase where friction at the corners
-can produce its wrenches."""
-
-
 def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
     """Write peers.md."""
-    equal = [row for row in rows if row.peer != PLANAR and row.peer not in LIMITED]
-    compiled, own, reference = (
-        [row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS
+    equal = [row for row in rows if row.peer not in LIMITED and not row.is_cold]
+    compiled, reference = (
+        [row for row in equal if row.is_same and row.way == way]
+        for way in ("compiled", "reference")
     )
+    cold = [row for row in rows if row.is_same and row.is_cold]
     peers = "; ".join(f"{peer}: {packages}" for peer, packages in used.items())
     parts = [f"`python benchmarks/peers.py` on {harness.machine()}. {peers}."]
     parts += [f"**Not measured: {why}**" for why in lacking]
@@ -324,21 +309,11 @@ def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
     if reference:
         parts.append('The reference backend, `backend="reference"`:')
         parts.append(time_table(reference, "reference"))
-    parts.append("Time of each call inside the peers' control steps (medians):")
-    parts.append(stage_table(compiled))
-    if own:
-        parts += ["## A user-defined task", OWN, time_table(own, "own task")]
+    if cold:
+        parts += ["## Times with cold caches", COLD, time_table(cold)]
     limited = [row for row in rows if row.peer in LIMITED]
     if limited:
         parts += ["## Joint limits", LIMITS, limits_table(limited)]
-    planar = [row for row in rows if row.peer == PLANAR]
-    if planar:
-        agreements = [
-            f"- {row.label}: {np.sum(row.differences <= row.tolerance)} of {row.states} states "
-            f"have the same torques; the largest difference is {row.difference:.1f} N·m."
-            for row in planar
-        ]
-        parts += ["## An easier problem", PLANAR_FEET, "\n".join(agreements), time_table(planar)]
     harness.write(__file__, "Computing time of floatbase, TSID and placo", *parts)
 
 
@@ -360,14 +335,16 @@ def main() -> int:
             python = python_of(peer, options.env.resolve())
             used[peer] = versions(python, PACKAGES[peer])
             for row in measure(peer, python, options.states, options.rounds):
-                told = f"{row.way} {row.robot} {row.peer} {row.label}"
+                told = f"{row.way} {row.robot} {row.peer} {row.label}{' cold' * row.is_cold}"
                 print(f"{told}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
                 rows.append(row)
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
     report(rows, used, lacking)
-    compiled = [row for row in rows if row.way == "compiled" and row.peer not in LIMITED]
+    compiled = [
+        row for row in rows if row.way == "compiled" and row.peer not in LIMITED and not row.is_cold
+    ]
     if rows:
         plot([row for row in compiled if row.is_same])
     return 1 if lacking else 0

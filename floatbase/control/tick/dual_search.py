@@ -4,7 +4,8 @@ Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequali
 violated inequality after another to its bound. An inequality that is never violated is only
 evaluated. The multiplier of a soft inequality is at most its weight. At its weight, the inequality
 leaves the active set, and its penalty becomes part of the cost. Newton's method recovers the last
-digits. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu their
+digits. What runs for every inequality is inlined (`jit_forceinline`), since a call passes a hundred
+numbers that describe arrays. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu their
 multipliers.
 """
 
@@ -23,7 +24,7 @@ from floatbase.control.tick.inequalities import (
     violated_row,
     weight_of_row,
 )
-from floatbase.control.tick.jit import jit
+from floatbase.control.tick.jit import jit, jit_forceinline
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
@@ -102,7 +103,7 @@ def invert_lower(L, W):
             W[i, c] /= L[i, i]
 
 
-@jit
+@jit_forceinline
 def add_row(W, U, d, z, q):
     """Reflect rows q: of W so that d = W row is zero after entry q, and make d column q of U.
 
@@ -148,7 +149,7 @@ def drop_row(active: ActiveSet, at, q):
             W[j, i], W[j + 1, i] = c * a + s * b, c * b - s * a
 
 
-@jit
+@jit_forceinline
 def multiply_by_row(W, row, d):
     """Write d (nb,) = W row.
 
@@ -170,7 +171,7 @@ def multiply_by_row(W, row, d):
         d[r] = a * W[r, i] + b * W[r, j] + row[k] * W[r, k]
 
 
-@jit
+@jit_forceinline
 def step_directions(W, U, d, q, z, r):
     """Write how β and the multipliers change as the multiplier of a new row grows by 1.
 
@@ -220,7 +221,7 @@ def add_penalties(limits: Inequalities, space: Parametrisation, nv, row, grad):
                 grad[c] -= weight * row[c]
 
 
-@jit
+@jit_forceinline
 def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: Inequalities, beta):
     """Bring one violated inequality to its bound; drop those whose multiplier would turn negative.
 
