@@ -32,27 +32,19 @@ JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kin
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
-RUNS = {  # our way, whom it is measured beside, robots
-    "tsid": (
-        ("compiled", "tsid", ROBOTS),
-        ("reference", "tsid", ("go2",)),
-        *(("compiled", limited, ROBOTS) for limited in LIMITED),
-    ),
-    "placo": (("compiled", "placo", ROBOTS),),
-}
+RUNS = {"tsid": ("tsid", *LIMITED), "placo": ("placo",)}  # problems of `peer_problems`
 
 
 @dataclass(frozen=True)
 class Row:
-    """One of our backends, one robot, one peer, one kind of states.
+    """One robot, one peer, one kind of states.
 
     unanswered: states without an answer, ours and theirs. differences: of the torques in each state
-    [N·m]; up to `tolerance`, they count as none. within: the largest difference between our way and
-    the reference backend on every fifth state [N·m]. ours, theirs: times [µs]. ratios: of the
-    medians of each block.
+    [N·m]; up to `tolerance`, they count as none. within: the largest difference between the
+    compiled and the reference backend on every fifth state [N·m]. ours, theirs: times [µs]. ratios:
+    of the medians of each block.
     """
 
-    way: str
     robot: str
     peer: str
     label: str
@@ -93,10 +85,8 @@ class Row:
         return " and ".join(map(str, self.unanswered))
 
 
-def compare(
-    pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int
-) -> Iterator[Row]:
-    """Rows of one robot, one of our ways and one peer."""
+def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
+    """Rows of one robot and one peer."""
     problem = peer_problems.problem(robot, peer)
     states = {
         label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS
@@ -114,7 +104,7 @@ def compare(
         process.ask("states", states)
     # every turn has all rows, so that a slow second of the machine does not fall on one row
     clocks = {"clock": rounds}
-    if way == "compiled" and peer in PACKAGES:
+    if peer in PACKAGES:
         clocks["cold"] = max(1, rounds // 20)  # each tick waits for 16 MB
     turns = {
         clock: [
@@ -128,7 +118,6 @@ def compare(
         times = np.array([turn[label] for turn in turns[clock]])
         medians = np.median(times, axis=2)
         yield Row(
-            way,
             robot,
             peer,
             label,
@@ -159,21 +148,18 @@ def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: 
     return float(np.max(_differences(ours[::5], [reference(q, v).tau for q, v in states[::5]])))
 
 
-def ours(way: str) -> Process:
+def ours(backend: str) -> Process:
     """floatbase, in the environment that runs this."""
-    return Process(Path(sys.executable), HERE / "peer_ours.py", [way], [HERE.parent])
+    return Process(Path(sys.executable), HERE / "peer_ours.py", [backend], [HERE.parent])
 
 
 def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
-    for way, name, robots in RUNS[peer]:
-        # the reference backend takes long
-        some = (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)
-        for robot in robots:
-            pair = [ours(way), Process(python, HERE / f"peer_{peer}.py")]
-            yield from compare(pair, way, robot, name, *some)
-            for process in pair:
-                process.close()
+    for name, robot in product(RUNS[peer], ROBOTS):
+        pair = [ours("compiled"), Process(python, HERE / f"peer_{peer}.py")]
+        yield from compare(pair, robot, name, n, rounds)
+        for process in pair:
+            process.close()
 
 
 # results ------------------------------------------------------------------------------------------
@@ -181,19 +167,19 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
 
 def torque_table(rows: Sequence[Row]) -> str:
     return harness.table(
-        "our way | robot | peer | states | compared | no answer: ours, peer | largest difference "
+        "robot | peer | states | compared | no answer: ours, peer | largest difference "
         "| from our reference",
         (
-            [row.way, row.robot, row.peer, row.label, row.states]
+            [row.robot, row.peer, row.label, row.states]
             + [row.missing, f"{row.difference:.1e} N·m", f"{row.within:.1e} N·m"]
             for row in rows
         ),
     )
 
 
-def time_table(rows: Sequence[Row], name: str = "floatbase") -> str:
+def time_table(rows: Sequence[Row]) -> str:
     return harness.table(
-        f"robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio "
+        "robot | peer | states | floatbase median | floatbase p99 | peer median | peer p99 | ratio "
         "| 10 to 90 % of blocks",
         (
             [row.robot, row.peer, row.label]
@@ -289,10 +275,6 @@ fifth state)."""
 def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
     """Write peers.md."""
     equal = [row for row in rows if row.peer not in LIMITED and not row.is_cold]
-    compiled, reference = (
-        [row for row in equal if row.is_same and row.way == way]
-        for way in ("compiled", "reference")
-    )
     cold = [row for row in rows if row.is_same and row.is_cold]
     peers = "; ".join(f"{peer}: {packages}" for peer, packages in used.items())
     parts = [f"`python benchmarks/peers.py` on {harness.machine()}. {peers}."]
@@ -300,15 +282,11 @@ def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
     problem = (peer_problems.__doc__ or "").strip()
     parts += [INTRODUCTION, "## The common problem", problem, SAMENESS, torque_table(equal)]
     parts += [
-        f"Torques differ, so times are not compared: "
-        f"{row.robot} with {row.peer}, {row.label}, {row.way}."
+        f"Torques differ, so times are not compared: {row.robot} with {row.peer}, {row.label}."
         for row in equal
         if not row.is_same
     ]
-    parts += ["## Times", time_table(compiled)]
-    if reference:
-        parts.append('The reference backend, `backend="reference"`:')
-        parts.append(time_table(reference, "reference"))
+    parts += ["## Times", time_table([row for row in equal if row.is_same])]
     if cold:
         parts += ["## Times with cold caches", COLD, time_table(cold)]
     limited = [row for row in rows if row.peer in LIMITED]
@@ -335,18 +313,16 @@ def main() -> int:
             python = python_of(peer, options.env.resolve())
             used[peer] = versions(python, PACKAGES[peer])
             for row in measure(peer, python, options.states, options.rounds):
-                told = f"{row.way} {row.robot} {row.peer} {row.label}{' cold' * row.is_cold}"
+                told = f"{row.robot} {row.peer} {row.label}{' cold' * row.is_cold}"
                 print(f"{told}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
                 rows.append(row)
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
     report(rows, used, lacking)
-    compiled = [
-        row for row in rows if row.way == "compiled" and row.peer not in LIMITED and not row.is_cold
-    ]
-    if rows:
-        plot([row for row in compiled if row.is_same])
+    warm = [row for row in rows if row.is_same and row.peer not in LIMITED and not row.is_cold]
+    if warm:
+        plot(warm)
     return 1 if lacking else 0
 
 

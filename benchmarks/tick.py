@@ -15,7 +15,7 @@ import numpy as np
 from harness import ROBOTS, SPREADS, clock, interleaved, microseconds, states, work
 
 import floatbase as fb
-from floatbase.control import JointLimits, LinearInequality
+from floatbase.control import JointLimits
 from floatbase.control.tick import tick
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint
 from floatbase.objectives import (
@@ -33,12 +33,11 @@ Rows = Iterator[list[object]]
 
 
 def controller(
-    robot: fb.Robot, backend: str = "compiled", contacts: fb.Contacts | None = None, **options: Any
+    robot: fb.Robot, backend: str = "compiled", **options: Any
 ) -> fb.WholeBodyController:
-    """Make a controller that stands, by default on all feet."""
-    contacts = fb.Contacts.feet(robot) if contacts is None else contacts
+    """Make a controller that stands on all feet."""
     tasks = fb.standing_tasks(robot.standing())
-    return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options)
+    return fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, backend=backend, **options)
 
 
 # tick time ----------------------------------------------------------------------------------------
@@ -93,22 +92,19 @@ class OwnCoM:
 
 
 def own(n: int) -> Rows:
-    """Measure user-defined tasks, inequalities and constraints on one problem."""
+    """Measure user-defined tasks and constraints on one problem."""
     for name in ROBOTS:
         robot = fb.load(name)
         at, feet = robot.standing(), fb.Contacts.feet(robot)
         joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
-        bounds = np.vstack([joint, -joint]), np.full(2, 50.0)
-        limited = {"inequalities": [LinearInequality("acceleration", "qdd", bounds)]}
         held = feet + fb.Contacts(
             [LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))]
         )
         controllers = [
             fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="compiled"),
-            fb.WholeBodyController(robot, feet, mine, backend="compiled", **limited),
             fb.WholeBodyController(robot, held, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="reference"),
         ]
@@ -213,40 +209,6 @@ def rollouts(turns: int) -> Rows:
         yield [name, *microseconds(np.median(times, axis=0)), f"{ratio:.2f}"]
 
 
-# growth -------------------------------------------------------------------------------------------
-
-
-def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
-    """Measure medians [µs] by facets, contacts and degrees of freedom; easy and saturated."""
-    go2, kinova, talos = map(fb.load, ("go2", "anymal_kinova", "talos"))
-
-    def points(robot: fb.Robot, count: int) -> fb.Contacts:
-        """Return point contacts at the first feet."""
-        return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:count]])
-
-    families = {
-        "facets (go2)": [(m, controller(go2, facets=m)) for m in (4, 8, 16, 32, 64)],
-        "contacts (go2)": [(i, controller(go2, contacts=points(go2, i))) for i in (1, 2, 3, 4)],
-        "joints (two points)": [
-            (robot.d, controller(robot, contacts=points(robot, 2)))
-            for robot in (go2, kinova, talos)
-        ],
-    }
-    found: dict[str, list[tuple[float, ...]]] = {}
-    for family, members in families.items():
-        medians = []
-        for spread in (SPREADS["easy"], SPREADS["saturated"]):
-            at = [states(member.robot, n, spread) for _, member in members]
-            times = [
-                [clock(member, at[i]) for i, (_, member) in enumerate(members)] for _ in range(8)
-            ]
-            medians.append([np.median([turn[i] for turn in times]) for i in range(len(members))])
-        found[family] = [
-            (x, easy, saturated) for (x, _), easy, saturated in zip(members, *medians, strict=True)
-        ]
-    return found
-
-
 def main() -> None:
     parser = harness.command_line(__doc__, states=(400, "random states for each row of a table"))
     few = parser.parse_args().states // 4
@@ -271,8 +233,8 @@ def main() -> None:
         ),
         "User-defined terms, called at every control step beside the compiled code (median):",
         harness.table(
-            "robot | states | built-in tasks | user-defined task | user-defined task and 2 "
-            "inequalities | user-defined constraint | user-defined task, reference",
+            "robot | states | built-in tasks | user-defined task | user-defined constraint | "
+            "user-defined task, reference",
             own(few),
         ),
         "Each task added to `standing_tasks` (median):",
@@ -286,15 +248,6 @@ def main() -> None:
         "The bare loop only reads the state,\ncalls the controller and advances MuJoCo. The ratio "
         "is the speed of `fb.rollout` divided by that of the bare loop.",
         harness.table("robot | bare loop | `fb.rollout` | ratio", rollouts(few // 4)),
-        "Growth of the median control step:",
-        harness.table(
-            "what | number | easy | saturated",
-            (
-                [what, x, *microseconds(row)]
-                for what, rows in growth(few).items()
-                for x, *row in rows
-            ),
-        ),
     )
 
 
