@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -33,8 +32,7 @@ def digest(*arrays: np.ndarray) -> str:
 
 
 def line(*words: object) -> None:
-    print(*words)
-    sys.stdout.flush()
+    print(*words, flush=True)
 
 
 def stances(robot: fb.Robot) -> dict[str, fb.Contacts]:

@@ -1,7 +1,6 @@
 """Measure `MPC` beside `Walk`, and `Jump`, on MuJoCo.
 
     python benchmarks/mpc.py               -> benchmarks/mpc.md
-    python benchmarks/mpc.py pushes jumps  measure only these sections again
     python benchmarks/mpc.py --pushes 12   fewer pushes
 
 All robots and speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.
@@ -10,20 +9,15 @@ The control period is 2 ms. Times are processor times of the thread.
 
 from __future__ import annotations
 
-import re
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import harness
-import clarabel
-import daqp
 import numpy as np
 import pinocchio as pin
 from harness import tilt, velocity, walker
-from scipy import sparse
 
 import floatbase as fb
 from floatbase.behaviours import MPC, Gait, HorizonQP, Jump, Walk
@@ -170,26 +164,6 @@ def difference_rows() -> Rows:
     yield ["200", f"{worst:.0e}"]
 
 
-def solver_rows() -> Rows:
-    for n in HORIZONS:
-        times = []
-        for horizon, arguments in recorded(n)[10:60]:
-            qp = horizon.qp(*arguments)
-            H, g, G, h = (np.array(a) for a in (qp.H, qp.g, qp.G, qp.h))
-            senses, none = np.zeros(len(h), dtype=np.int32), np.full(len(h), -1e30)
-            P, C = sparse.csc_matrix(np.triu(H)), sparse.csc_matrix(G)
-            by_daqp = harness.work(daqp.solve, H, g, G, h, none, senses)
-            times.append((by_daqp, harness.work(by_clarabel, P, g, C, h)))
-        yield [f"{n}", f"{len(g)}", *(f"{1e3 * each:.2f} ms" for each in np.median(times, axis=0))]
-
-
-def by_clarabel(P: Any, g: np.ndarray, G: Any, h: np.ndarray) -> None:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    cones = [clarabel.NonnegativeConeT(len(h))]
-    clarabel.DefaultSolver(P, g, G, h, cones, settings).solve()
-
-
 def jump_rows() -> Rows:
     for name, (height, distance) in JUMPS.items():
         robot, contacts = walker(name)
@@ -282,46 +256,42 @@ class Predicting(MPC):
         return command
 
 
-def sections(n: int) -> dict[str, list[tuple[str, str, Rows]]]:
-    """Return texts, headers and rows of all tables by the first word of their heading."""
-    return {
-        "speed": [(
+def sections(n: int) -> list[tuple[str, str, Rows]]:
+    """Return texts, headers and rows of all tables."""
+    return [
+        (
             "## Speed, tilt and torque\n\n"
             "Speed of the last second, largest tilt, and torque as a fraction of the limits (rms\n"
             "and largest) in the last second. (x) is the speed to which the steps are limited.",
             "robot | desired | " + " | ".join(CONTROLLERS),
             speed_rows(),
-        )],
-        "jumps": [(
+        ),
+        (
             "## Jumps\n\nTen jumps of each robot: commanded against reached height and distance.",
             "robot | height, m | distance, m | completed | height error | distance error | tilt",
             jump_rows(),
-        )],
-        "pushes": [(
+        ),
+        (
             f"## Pushes\n\n{n} pushes of 0.1 s on the base, in random directions and at random\n"
             "times of a trot (swing 0.25 s) at 0.3 m/s. Each changes the velocity by 0.5 to\n"
             "1.5 m/s. The same pushes for both controllers; survived, and mean of the largest\n"
             "tilts of the survivors.",
             "robot | `Walk` | `MPC`",
             push_rows(n),
-        )],
-        "time": [(
+        ),
+        (
             "## Time per control step and length of the horizon\n\n"
             "go2 trots at 0.5 m/s. The horizon has n intervals of 30 ms and is solved every\n"
             "20 ms. Median, mean and 99 % quantile of a control step.",
             " | median | mean | 99 % | speed | tilt",
             horizon_rows(),
-        )],
-        "solvers": [(
-            "## Solvers\n\nForces of go2 at random states beside those of Clarabel:",
+        ),
+        (
+            "## Solver\n\nForces of go2 at random states beside those of Clarabel:",
             "horizons | largest difference, fraction of the weight",
             difference_rows(),
-        ), (
-            "Times to solve the quadratic program of a flying trot, without assembling it:",
-            "n | variables | DAQP | Clarabel",
-            solver_rows(),
-        )],
-        "flight": [(
+        ),
+        (
             "## Flight and prediction\n\n"
             "MuJoCo against the closed form while no foot touches the ground: largest\n"
             "differences. The velocity of the centre of mass is compared with free fall, and the\n"
@@ -330,38 +300,33 @@ def sections(n: int) -> dict[str, list[tuple[str, str, Rows]]]:
             "centre of mass by g t · 0.5 ms, which is 1.4 mm in 286 ms.",
             "robot | flight | velocity | angular momentum | energy",
             flight_rows(),
-        ), (
+        ),
+        (
             "Error of the horizon's prediction 100 ms ahead (5 intervals of 20 ms), against\n"
             "MuJoCo: largest and root mean square, of the position of the centre of mass and of\n"
             "its velocity.",
             "robot | gait, 0.5 m/s | position | velocity",
             prediction_rows(),
-        )],
-    }  # fmt: skip
+        ),
+    ]  # fmt: skip
 
 
 def main() -> None:
     parser = harness.command_line(__doc__, pushes=(30, "pushes of each robot"))
-    parser.add_argument("sections", nargs="*", choices=[*sections(0), []], help="all by default")
-    arguments = parser.parse_args()
-    made, path = sections(arguments.pushes), Path(__file__).with_suffix(".md")
-    stored = path.read_text(encoding="utf-8").split("\n## ")[1:] if path.exists() else []
-    parts = dict.fromkeys(made, "")
-    parts |= {re.findall(r"\w+", part)[0].lower(): f"## {part.rstrip()}" for part in stored}
-    for name in arguments.sections or made:
-        parts[name] = "\n\n".join(
-            f"{text}\n\n{harness.table(header, rows)}" for text, header, rows in made[name]
-        )
-        harness.write(
-            __file__,
-            "Model predictive control and jumps: measured results",
-            f"Made by `python benchmarks/mpc.py` with floatbase {fb.__version__}. All robots and\n"
-            "speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.\n"
-            "The control period is 2 ms. `Walk` and `MPC` trot with a swing of 0.15 s. The flying\n"
-            "trot has stances of 0.1 s and flights of 0.04 s. Times are processor times of the\n"
-            "thread.",
-            *filter(None, parts.values()),
-        )
+    parts = [
+        f"{text}\n\n{harness.table(header, rows)}"
+        for text, header, rows in sections(parser.parse_args().pushes)
+    ]
+    harness.write(
+        __file__,
+        "Model predictive control and jumps: measured results",
+        f"Made by `python benchmarks/mpc.py` with floatbase {fb.__version__}. All robots and\n"
+        "speeds use the same numbers. Friction is 0.6 in the controller and 1 on the ground.\n"
+        "The control period is 2 ms. `Walk` and `MPC` trot with a swing of 0.15 s. The flying\n"
+        "trot has stances of 0.1 s and flights of 0.04 s. Times are processor times of the\n"
+        "thread.",
+        *parts,
+    )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """floatbase's side of the comparison: what its users write. Started by `peers.py`; the argument is
-one of `WAYS`.
+a backend.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def build(description: dict) -> Contender:
         except InfeasibleError:
             return None
 
-    return Contender(tick, {"tick": tick})
+    return tick
 
 
 if __name__ == "__main__":

@@ -39,20 +39,13 @@ def build(description: dict) -> Contender:
     for contact in description["contacts"]:
         _add_contact(solver, contact, description["force_weight"])
 
-    def configure(q, v):
-        robot.state.q, robot.state.qd = q, v
-        robot.update_kinematics()
-
-    def solve(_=None):
-        return solver.solve()
-
     def tick(q, v):
         robot.state.q, robot.state.qd = q, v
         robot.update_kinematics()
         result = solver.solve()
         return result.tau[6:] if result.success else None
 
-    return Contender(tick, {"state and kinematics": configure, "solver.solve()": solve})
+    return tick
 
 
 def _prepared(urdf: str, contacts: list[dict]) -> str:
@@ -88,9 +81,7 @@ def _add_tasks(solver: placo.DynamicsSolver, description: dict) -> None:
 
 
 def _add_contact(solver: placo.DynamicsSolver, contact: dict, force_weight: float) -> None:
-    """A point, a sole that carries a wrench (planar), or a sole that carries a force at each
-    corner.
-    """
+    """A point, or a sole that carries a force at each corner."""
     frame, corners = contact["frame"], contact["corners"]
     if corners is None:
         task = _kept(solver.add_position_task(frame, np.zeros(3)), frame, "hard", 1.0)
@@ -99,15 +90,10 @@ def _add_contact(solver: placo.DynamicsSolver, contact: dict, force_weight: floa
         task = solver.add_frame_task(frame, np.eye(4))
         for part in (task.position(), task.orientation()):
             _kept(part, frame, "hard", 1.0)
-        if contact["planar"]:
-            made = [solver.add_planar_contact(task)]
-            made[0].length, made[0].width = 2.0 * np.max(corners, axis=0)[:2]
-            made[0].weight_moments = force_weight
-        else:
-            made = []
-            for name in (_corner(frame, i) for i in range(len(corners))):
-                carrier = _kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0)
-                made.append(solver.add_unilateral_point_contact(carrier))
+        made = []
+        for name in (_corner(frame, i) for i in range(len(corners))):
+            carrier = _kept(solver.add_position_task(name, np.zeros(3)), name, "soft", 0.0)
+            made.append(solver.add_unilateral_point_contact(carrier))
     for one in made:
         one.mu, one.weight_forces, one.weight_tangentials = contact["mu"], force_weight, 0.0
 

@@ -17,7 +17,7 @@ out:
   force regularization, and on flat feet as the only one.
 - placo's flat feet also have a force at each corner: points without weight carry the forces, and
   the frame of the foot does not move. placo's own flat foot carries a wrench without a limit on
-  the moment about the normal, which is an easier problem and is measured separately.
+  the moment about the normal, which is an easier problem.
 - Joint limits are off; TSID and floatbase are compared with joint limits separately.
 """
 
@@ -31,14 +31,12 @@ from typing import Any
 import harness
 import numpy as np
 import pinocchio as pin
-from tick import OwnCoM
 
 import floatbase as fb
 from floatbase.control import JointLimits
+from floatbase.robots import Foot
 
 MU = 0.7
-# floatbase's answers; own: compiled, with a task as a user writes it
-WAYS = ("compiled", "own", "reference")
 # weight; with that of standing_tasks, 1e-3, the peers' solver loses the digits in which torques are
 # compared
 POSTURE = 0.1
@@ -64,7 +62,6 @@ REGULARISATION = {
     ("tsid", "flat"): Regularisation(0.0, 0.0, HESSIAN, HESSIAN, 0.0),
     ("placo", "points"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
     ("placo", "flat"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
-    ("placo planar", "flat"): Regularisation(0.0, 1e-3, 1e-13, 1e-11, 1e-3),
 }
 
 
@@ -121,16 +118,12 @@ class Problem:
         slow = np.abs(v) <= limits.speeds
         return bool(np.all(inside & slow & (v**2 <= 2.0 * limits.braking * gap)))
 
-    def controller(self, way: str) -> fb.WholeBodyController:
-        """floatbase's answer to it.
-
-        way: one of `WAYS`; of one's own is the task for the centre of mass.
-        """
-        com, *others = self.tasks
-        tasks = [OwnCoM(com.position) if way == "own" else com, *others]
-        backend = "compiled" if way == "own" else way
+    def controller(self, backend: str) -> fb.WholeBodyController:
+        """floatbase's answer to it."""
         options = {"facets": 4, "inner_approximation": False, "joint_limits": self.joint_limits}
-        return fb.WholeBodyController(self.robot, self.contacts, tasks, backend=backend, **options)
+        return fb.WholeBodyController(
+            self.robot, self.contacts, self.tasks, backend=backend, **options
+        )
 
     def states(self, label: str, n: int) -> list[tuple[np.ndarray, np.ndarray]]:
         """Random configurations and velocities, the same ones every time."""
@@ -145,7 +138,6 @@ class Problem:
     def description(self) -> dict[str, Any]:
         """The problem in numbers and names, for a process without floatbase."""
         robot, (com, base, posture) = self.robot, self.tasks[:3]
-        planar = self.peer == "placo planar"
         return {
             "robot": robot.name,
             "peer": self.peer,
@@ -162,7 +154,7 @@ class Problem:
             "hessian": self.regularisation.hessian,
             "torque_weight": self.regularisation.peer_torque,
             "contacts": [
-                {"frame": foot.frame, "corners": _plain(foot.corners), "mu": MU, "planar": planar}
+                {"frame": foot.frame, "corners": _plain(foot.corners), "mu": MU}
                 for foot in robot.feet
             ],
         }
@@ -194,7 +186,7 @@ def problem(robot: str, peer: str) -> Problem:
     """The problem of that name. Point feet are taken without their balls: they touch at their
     frames.
     """
-    feet = [foot if foot.is_flat else foot.frame for foot in fb.load(robot).feet]
+    feet = [foot if foot.is_flat else Foot(foot.frame) for foot in fb.load(robot).feet]
     return Problem(fb.load(robot, feet=feet), peer)
 
 

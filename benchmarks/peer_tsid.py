@@ -40,12 +40,7 @@ def build(description: dict) -> Contender:
         solution = solver.solve(formulation.computeProblemData(0.0, q, v))
         return formulation.getActuatorForces(solution) if solution.status == 0 else None
 
-    stages = {
-        "computeProblemData": lambda q, v: formulation.computeProblemData(0.0, q, v),
-        "solve": solver.solve,
-        "getActuatorForces": formulation.getActuatorForces,
-    }
-    return Contender(tick, stages)
+    return tick
 
 
 def _add_contact(formulation, robot, contact: dict, force_weight: float):

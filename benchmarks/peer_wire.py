@@ -8,7 +8,7 @@ output:
     {"states": {label: [[q, v], …]}} keep these states
     {"torques": label}               the torques at each of them, null where the solver found none
     {"clock": label}                 the time of each tick, µs
-    {"stages": label}                the median time of each stage of the tick, µs
+    {"cold": label}                  the same, with 16 MB written before each tick
 """
 
 from __future__ import annotations
@@ -18,25 +18,16 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-
-@dataclass(frozen=True)
-class Contender:
-    """One way to solve a problem.
-
-    tick: q, v -> torques [N·m], or None where the solver found none. stages: the tick in pieces, by
-        name; the first takes q and
-    v, each other what the one before it gave.
-    """
-
-    tick: Callable[[np.ndarray, np.ndarray], np.ndarray | None]
-    stages: Mapping[str, Callable[..., Any]]
+# q, v -> torques [N·m], or None where the solver found none
+Contender = Callable[[np.ndarray, np.ndarray], "np.ndarray | None"]
+States = Sequence[tuple[np.ndarray, np.ndarray]]
 
 
 def serve(build: Callable[[dict[str, Any]], Contender]) -> None:
@@ -44,7 +35,12 @@ def serve(build: Callable[[dict[str, Any]], Contender]) -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what C++ libraries print is no answer
     contender: Contender | None = None
-    states: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    states: dict[str, States] = {}
+    answering: dict[str, Any] = {
+        "torques": _torques,
+        "clock": partial(_clock, np.empty(0)),
+        "cold": partial(_clock, np.empty(2**21)),  # 16 MB
+    }
     for line in sys.stdin:
         ((order, what),) = json.loads(line).items()
         answer: Any = "done"
@@ -56,40 +52,25 @@ def serve(build: Callable[[dict[str, Any]], Contender]) -> None:
             }
         else:
             assert contender is not None, "the problem comes first"
-            answer = {"torques": _torques, "clock": _clock, "stages": _stages}[order](
-                contender, states[what]
-            )
+            answer = answering[order](contender, states[what])
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
 
 
-def _torques(
-    contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> list[list[float] | None]:
-    found = [contender.tick(q, v) for q, v in states]
+def _torques(contender: Contender, states: States) -> list[list[float] | None]:
+    found = [contender(q, v) for q, v in states]
     return [None if tau is None else np.asarray(tau).tolist() for tau in found]
 
 
-def _clock(contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[float]:
-    times, tick, now = [], contender.tick, time.perf_counter_ns
-    for q, v in states:
+def _clock(other_memory: np.ndarray, contender: Contender, states: States) -> list[float]:
+    """The time of each tick [µs]. Between ticks, other memory is written, as by other work."""
+    times, now = [], time.perf_counter_ns
+    for i, (q, v) in enumerate(states):
+        other_memory.fill(i)
         start = now()
-        tick(q, v)
+        contender(q, v)
         times.append(1e-3 * (now() - start))
     return times
-
-
-def _stages(
-    contender: Contender, states: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> dict[str, float]:
-    times = np.empty((len(states), len(contender.stages)))
-    for row, (q, v) in zip(times, states, strict=True):
-        given: tuple[Any, ...] = (q, v)
-        for i, stage in enumerate(contender.stages.values()):
-            start = time.perf_counter_ns()
-            given = (stage(*given),)
-            row[i] = 1e-3 * (time.perf_counter_ns() - start)
-    return dict(zip(contender.stages, np.median(times, axis=0).tolist(), strict=True))
 
 
 class Process:

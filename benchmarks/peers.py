@@ -26,35 +26,25 @@ from harness import ROBOTS, SPREADS, microseconds
 from peer_environments import MissingError, python_of, versions
 from peer_problems import LIMITED
 from peer_wire import Process
-from tick import JOINT_LIMITS
 
 HERE = Path(__file__).parent
+JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
 # of the strongest motor's limit, by which torques may differ for the optimum to count as one
 TOLERANCE = 1e-6
 PACKAGES = {"tsid": ("tsid", "pin"), "placo": ("placo", "pin")}
-PLANAR = "placo planar"  # placo's own flat foot, an easier problem
-RUNS = {  # our way, whom it is measured beside, robots
-    "tsid": (
-        ("compiled", "tsid", ROBOTS),
-        ("own", "tsid", ROBOTS),
-        ("reference", "tsid", ("go2",)),
-        *(("compiled", limited, ROBOTS) for limited in LIMITED),
-    ),
-    "placo": (("compiled", "placo", ROBOTS), ("compiled", PLANAR, ("talos",))),
-}
+RUNS = {"tsid": ("tsid", *LIMITED), "placo": ("placo",)}  # problems of `peer_problems`
 
 
 @dataclass(frozen=True)
 class Row:
-    """One of our ways (`peer_problems.WAYS`), one robot, one peer, one kind of states.
+    """One robot, one peer, one kind of states.
 
     unanswered: states without an answer, ours and theirs. differences: of the torques in each state
-    [N·m]; up to `tolerance`, they count as none. within: the largest difference between our way and
-    the reference backend on every fifth state [N·m]. ours, theirs: times [µs]. ratios: of the
-    medians of each block.
+    [N·m]; up to `tolerance`, they count as none. within: the largest difference between the
+    compiled and the reference backend on every fifth state [N·m]. ours, theirs: times [µs]. ratios:
+    of the medians of each block.
     """
 
-    way: str
     robot: str
     peer: str
     label: str
@@ -66,7 +56,7 @@ class Row:
     ours: np.ndarray
     theirs: np.ndarray
     ratios: np.ndarray
-    stages: dict[str, float]
+    is_cold: bool = False
 
     @property
     def difference(self) -> float:
@@ -95,10 +85,8 @@ class Row:
         return " and ".join(map(str, self.unanswered))
 
 
-def compare(
-    pair: Sequence[Process], way: str, robot: str, peer: str, n: int, rounds: int
-) -> Iterator[Row]:
-    """Rows of one robot, one of our ways and one peer."""
+def compare(pair: Sequence[Process], robot: str, peer: str, n: int, rounds: int) -> Iterator[Row]:
+    """Rows of one robot and one peer."""
     problem = peer_problems.problem(robot, peer)
     states = {
         label: [(q.tolist(), v.tolist()) for q, v in problem.states(label, n)] for label in SPREADS
@@ -115,16 +103,21 @@ def compare(
     for process in pair:
         process.ask("states", states)
     # every turn has all rows, so that a slow second of the machine does not fall on one row
-    turns = [
-        {label: [process.ask("clock", label) for process in pair] for label in SPREADS}
-        for _ in range(rounds)
-    ]
-    for label in SPREADS:
+    clocks = {"clock": rounds}
+    if peer in PACKAGES:
+        clocks["cold"] = max(1, rounds // 20)  # each tick waits for 16 MB
+    turns = {
+        clock: [
+            {label: [process.ask(clock, label) for process in pair] for label in SPREADS}
+            for _ in range(n_turns)
+        ]
+        for clock, n_turns in clocks.items()
+    }
+    for label, clock in product(SPREADS, clocks):
         ours, theirs = ([np.array(torques[i]) for i in kept[label]] for torques in found[label])
-        times = np.array([turn[label] for turn in turns])
+        times = np.array([turn[label] for turn in turns[clock]])
         medians = np.median(times, axis=2)
         yield Row(
-            way,
             robot,
             peer,
             label,
@@ -136,7 +129,7 @@ def compare(
             ours=times[:, 0].ravel(),
             theirs=times[:, 1].ravel(),
             ratios=medians[:, 0] / medians[:, 1],
-            stages=pair[1].ask("stages", label),
+            is_cold=clock == "cold",
         )
 
 
@@ -149,27 +142,24 @@ def _within(problem: peer_problems.Problem, ours: Sequence[np.ndarray], states: 
     """The largest difference from floatbase's reference backend on some of the states, N·m, where
     that says who rounds.
     """
-    if problem.peer == PLANAR or not states:
+    if not states:
         return np.nan
     reference = problem.controller("reference")
     return float(np.max(_differences(ours[::5], [reference(q, v).tau for q, v in states[::5]])))
 
 
-def ours(way: str) -> Process:
+def ours(backend: str) -> Process:
     """floatbase, in the environment that runs this."""
-    return Process(Path(sys.executable), HERE / "peer_ours.py", [way], [HERE.parent])
+    return Process(Path(sys.executable), HERE / "peer_ours.py", [backend], [HERE.parent])
 
 
 def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
     """Every row of one peer."""
-    for way, name, robots in RUNS[peer]:
-        # the reference backend takes long
-        some = (max(1, n // 6), min(20, rounds)) if way == "reference" else (n, rounds)
-        for robot in robots:
-            pair = [ours(way), Process(python, HERE / f"peer_{peer}.py")]
-            yield from compare(pair, way, robot, name, *some)
-            for process in pair:
-                process.close()
+    for name, robot in product(RUNS[peer], ROBOTS):
+        pair = [ours("compiled"), Process(python, HERE / f"peer_{peer}.py")]
+        yield from compare(pair, robot, name, n, rounds)
+        for process in pair:
+            process.close()
 
 
 # results ------------------------------------------------------------------------------------------
@@ -177,35 +167,24 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
 
 def torque_table(rows: Sequence[Row]) -> str:
     return harness.table(
-        "our way | robot | peer | states | compared | no answer: ours, peer | largest difference "
+        "robot | peer | states | compared | no answer: ours, peer | largest difference "
         "| from our reference",
         (
-            [row.way, row.robot, row.peer, row.label, row.states]
+            [row.robot, row.peer, row.label, row.states]
             + [row.missing, f"{row.difference:.1e} N·m", f"{row.within:.1e} N·m"]
             for row in rows
         ),
     )
 
 
-def time_table(rows: Sequence[Row], name: str = "floatbase") -> str:
+def time_table(rows: Sequence[Row]) -> str:
     return harness.table(
-        f"robot | peer | states | {name} median | {name} p99 | peer median | peer p99 | ratio "
+        "robot | peer | states | floatbase median | floatbase p99 | peer median | peer p99 | ratio "
         "| 10 to 90 % of blocks",
         (
             [row.robot, row.peer, row.label]
             + microseconds(np.percentile([row.ours, row.theirs], [50, 99], axis=1).T.ravel())
             + [f"**{row.ratio:.2f}**", row.middle]
-            for row in rows
-        ),
-    )
-
-
-def stage_table(rows: Sequence[Row]) -> str:
-    return harness.table(
-        "robot | peer | states | time of each call",
-        (
-            [row.robot, row.peer, row.label]
-            + [", ".join(f"{name} {spent:.1f} µs" for name, spent in row.stages.items())]
             for row in rows
         ),
     )
@@ -267,13 +246,9 @@ torques, in Python, through each library's own binding: `computeProblemData`, `s
 floatbase. The peers are the packages on PyPI, compiled for any processor of the architecture. numba
 compiles floatbase's control step for the processor in use."""
 
-OWN = """\
-floatbase accepts tasks written in Python. TSID's binding accepts only its own classes:
-`addMotionTask` has an overload for each of them, and C++ never calls what a Python subclass
-overrides, so a custom task has to be written in C++. These rows therefore do not compare the same
-thing; they show the cost of a task in Python. The problem is the one above, but floatbase's task
-for the centre of mass is the class `OwnCoM` of `benchmarks/tick.py`, called at every control step,
-while TSID uses its `TaskComEquality`."""
+COLD = """\
+A controller runs between other work, which replaces the contents of the processor's caches. Here,
+16 MB are written before each control step of both libraries. The time does not include this."""
 
 LIMITS = """\
 The problem is the one above, with hard joint limits: `TaskJointPosVelAccBounds` in TSID,
@@ -297,48 +272,26 @@ floatbase's compiled and reference backends, which share no solver, agree more c
 fifth state)."""
 
 
-PLANAR_FEET = """\
-placo's own flat foot has six variables instead of twelve and no limit on the moment about its
-normal, so its problem is easier. Its torques equal those of floatbase where friction at the corners
-can produce its wrenches."""
-
-
 def report(rows: list[Row], used: dict[str, str], lacking: list[str]) -> None:
     """Write peers.md."""
-    equal = [row for row in rows if row.peer != PLANAR and row.peer not in LIMITED]
-    compiled, own, reference = (
-        [row for row in equal if row.is_same and row.way == way] for way in peer_problems.WAYS
-    )
+    equal = [row for row in rows if row.peer not in LIMITED and not row.is_cold]
+    cold = [row for row in rows if row.is_same and row.is_cold]
     peers = "; ".join(f"{peer}: {packages}" for peer, packages in used.items())
     parts = [f"`python benchmarks/peers.py` on {harness.machine()}. {peers}."]
     parts += [f"**Not measured: {why}**" for why in lacking]
     problem = (peer_problems.__doc__ or "").strip()
     parts += [INTRODUCTION, "## The common problem", problem, SAMENESS, torque_table(equal)]
     parts += [
-        f"Torques differ, so times are not compared: "
-        f"{row.robot} with {row.peer}, {row.label}, {row.way}."
+        f"Torques differ, so times are not compared: {row.robot} with {row.peer}, {row.label}."
         for row in equal
         if not row.is_same
     ]
-    parts += ["## Times", time_table(compiled)]
-    if reference:
-        parts.append('The reference backend, `backend="reference"`:')
-        parts.append(time_table(reference, "reference"))
-    parts.append("Time of each call inside the peers' control steps (medians):")
-    parts.append(stage_table(compiled))
-    if own:
-        parts += ["## A user-defined task", OWN, time_table(own, "own task")]
+    parts += ["## Times", time_table([row for row in equal if row.is_same])]
+    if cold:
+        parts += ["## Times with cold caches", COLD, time_table(cold)]
     limited = [row for row in rows if row.peer in LIMITED]
     if limited:
         parts += ["## Joint limits", LIMITS, limits_table(limited)]
-    planar = [row for row in rows if row.peer == PLANAR]
-    if planar:
-        agreements = [
-            f"- {row.label}: {np.sum(row.differences <= row.tolerance)} of {row.states} states "
-            f"have the same torques; the largest difference is {row.difference:.1f} N·m."
-            for row in planar
-        ]
-        parts += ["## An easier problem", PLANAR_FEET, "\n".join(agreements), time_table(planar)]
     harness.write(__file__, "Computing time of floatbase, TSID and placo", *parts)
 
 
@@ -360,16 +313,16 @@ def main() -> int:
             python = python_of(peer, options.env.resolve())
             used[peer] = versions(python, PACKAGES[peer])
             for row in measure(peer, python, options.states, options.rounds):
-                told = f"{row.way} {row.robot} {row.peer} {row.label}"
+                told = f"{row.robot} {row.peer} {row.label}{' cold' * row.is_cold}"
                 print(f"{told}: {row.difference:.1e} N·m, {row.ratio:.2f} ×", flush=True)
                 rows.append(row)
         except (MissingError, RuntimeError) as error:
             lacking.append(f"{peer}. {error}")
             print(f"No {peer}: {error}", flush=True)
     report(rows, used, lacking)
-    compiled = [row for row in rows if row.way == "compiled" and row.peer not in LIMITED]
-    if rows:
-        plot([row for row in compiled if row.is_same])
+    warm = [row for row in rows if row.is_same and row.peer not in LIMITED and not row.is_cold]
+    if warm:
+        plot(warm)
     return 1 if lacking else 0
 
 

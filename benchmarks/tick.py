@@ -1,22 +1,18 @@
-"""Measure the control step of both backends.
+"""Measure the control step of both backends, and rollouts -> benchmarks/tick.md.
 
-    python benchmarks/tick.py                    times, growth -> benchmarks/tick.md, tick.png
-    python benchmarks/tick.py --joint-limits     control steps with inactive joint limits
-                                                 relative to control steps without joint limits
-
-Both backends run alternately on the same states. The ratios are reliable; the microseconds depend
-on the machine.
+Functions that are compared run alternately on the same states. The ratios are reliable; the
+microseconds depend on the machine.
 """
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import harness
 import numpy as np
-from harness import ROBOTS, SPREADS, clock, interleaved, microseconds, states
+from harness import ROBOTS, SPREADS, clock, interleaved, microseconds, states, work
 
 import floatbase as fb
 from floatbase.control import JointLimits, LinearInequality, capture_point_inequality
@@ -35,9 +31,10 @@ from floatbase.objectives import (
     RelativePoseTask,
     Task,
 )
+from floatbase.playground import ModelMismatch
 
 BACKENDS = ("compiled", "reference")
-JOINT_LIMITS = ("position limit", "velocity limit", "acceleration limit")  # kinds of constraints
+COMPARED = ("go2", "g1", "talos")
 Rows = Iterator[list[object]]
 
 
@@ -45,7 +42,7 @@ def controller(
     robot: fb.Robot, backend: str = "compiled", contacts: fb.Contacts | None = None, **options: Any
 ) -> fb.WholeBodyController:
     """Make a controller that stands, by default on all feet."""
-    contacts = fb.Contacts.feet(robot) if contacts is None else contacts
+    contacts = contacts or fb.Contacts.feet(robot)
     tasks = fb.standing_tasks(robot.standing())
     return fb.WholeBodyController(robot, contacts, tasks, backend=backend, **options)
 
@@ -102,22 +99,19 @@ class OwnCoM:
 
 
 def own(n: int) -> Rows:
-    """Measure user-defined tasks, inequalities and constraints on one problem."""
+    """Measure user-defined tasks and constraints on one problem."""
     for name in ROBOTS:
         robot = fb.load(name)
         at, feet = robot.standing(), fb.Contacts.feet(robot)
         joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
-        bounds = np.vstack([joint, -joint]), np.full(2, 50.0)
-        limited = {"inequalities": [LinearInequality("acceleration", "qdd", bounds)]}
         held = feet + fb.Contacts(
             [LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))]
         )
         controllers = [
             fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="compiled"),
-            fb.WholeBodyController(robot, feet, mine, backend="compiled", **limited),
             fb.WholeBodyController(robot, held, tasks, backend="compiled"),
             fb.WholeBodyController(robot, feet, mine, backend="reference"),
         ]
@@ -168,7 +162,7 @@ def added_contacts(robot: fb.Robot) -> dict[str, fb.Contacts]:
 
 def one_more_task(n: int) -> Rows:
     """Measure the control step with each task, inequality or constraint, relative to without."""
-    for name in ("go2", "g1", "talos"):
+    for name in COMPARED:
         robot = fb.load(name)
         feet, standing = fb.Contacts.feet(robot), fb.standing_tasks(robot.standing())
         added = {
@@ -193,96 +187,68 @@ def one_more_task(n: int) -> Rows:
             yield [name, label, *microseconds([without, after]), f"{after / without:.2f}"]
 
 
-# joint limits -------------------------------------------------------------------------------------
+# other problems -----------------------------------------------------------------------------------
 
 
-def joint_limits(n: int, rounds: int = 40) -> Rows:
-    """Measure the cost of joint limits in states in which none is active."""
+def other_problems(n: int) -> Rows:
+    """Measure joint limits, other models and levels beside the weighted step on their backend."""
+    for name in COMPARED:
+        robot = fb.load(name)
+        com, base, *rest = tasks = fb.standing_tasks(robot.standing())
+        options: dict[str, dict[str, Any]] = {
+            "hard joint limits": {"joint_limits": JointLimits.of(robot, weight=None)},
+            "soft joint limits": {"joint_limits": "robot"},
+            "mismatched model": {"modify_qp": ModelMismatch(mass=1.2)},
+            "two levels": {"tasks": [[com, base], rest]},
+            "three levels": {"tasks": [[com], [base], rest]},
+        }
+        for what, changed in options.items():
+            given = {"tasks": tasks, "joint_limits": None} | changed
+            other = fb.WholeBodyController(robot, fb.Contacts.feet(robot), **given)
+            plain = controller(robot, other.backend, joint_limits=None)
+            at = states(robot, n if other.backend == "compiled" else n // 10, SPREADS["easy"])
+            without, after = np.median(interleaved((plain, other), at, 3), axis=1)
+            times = microseconds([without, after])
+            yield [name, what, other.backend, *times, f"{after / without:.2f}"]
+
+
+def worst_steps(n: int) -> Rows:
+    """Measure many steps with garbage collection, beside a loop that calls an empty function."""
+    assert gc.isenabled()
+    for name in COMPARED:
+        robot = fb.load(name)
+        at = [state for state in states(robot, 100, SPREADS["easy"]) for _ in range(n // 100)]
+        for what, call in (("control step", controller(robot)), ("empty", lambda q, v: None)):
+            times = clock(call, at)
+            yield [name, what, *microseconds([*np.percentile(times, [50, 99]), times.max()])]
+
+
+# rollouts -----------------------------------------------------------------------------------------
+
+
+def bare(sim: fb.Simulation, control: fb.WholeBodyController, duration: float) -> None:
+    """Run a loop without checks, record and fall detection."""
+    for _ in range(round(duration / sim.timestep)):
+        sim.advance(control(sim.q, sim.v, sim.time).tau)
+
+
+def rollouts(turns: int) -> Rows:
+    """Measure `fb.rollout` beside a bare loop, a second each [µs per step]."""
     for name in ROBOTS:
         robot = fb.load(name)
-        off, hard, soft = (
-            controller(robot, joint_limits=limits)
-            for limits in (None, JointLimits.of(robot, weight=None), "robot")
-        )
-        at = [
-            (q, v)
-            for q, v in states(robot, n, SPREADS["easy"])
-            if not any(row.kind.endswith(JOINT_LIMITS) for row in hard(q, v).active)
-        ]
-        times = np.reshape(interleaved((off, hard, soft), at, rounds), (3, rounds, -1))
-        medians = np.median(times, axis=2)
-        ratios = np.median(medians[1:] / medians[0], axis=1)
-        yield [name, len(at), f"{np.median(times[0]):.1f} µs", *(f"{x:.3f}" for x in ratios)]
-
-
-# growth -------------------------------------------------------------------------------------------
-
-
-def growth(n: int) -> dict[str, list[tuple[float, ...]]]:
-    """Measure medians [µs] by facets, contacts and degrees of freedom; easy and saturated."""
-    go2, kinova, talos = map(fb.load, ("go2", "anymal_kinova", "talos"))
-
-    def points(robot: fb.Robot, count: int) -> fb.Contacts:
-        """Return point contacts at the first feet."""
-        return fb.Contacts.points(robot, frames=[foot.frame for foot in robot.feet[:count]])
-
-    families = {
-        "facets (go2)": [(m, controller(go2, facets=m)) for m in (4, 8, 16, 32, 64)],
-        "contacts (go2)": [(i, controller(go2, contacts=points(go2, i))) for i in (1, 2, 3, 4)],
-        "joints (two points)": [
-            (robot.d, controller(robot, contacts=points(robot, 2)))
-            for robot in (go2, kinova, talos)
-        ],
-    }
-    found: dict[str, list[tuple[float, ...]]] = {}
-    for family, members in families.items():
-        medians = []
-        for spread in (SPREADS["easy"], SPREADS["saturated"]):
-            at = [states(member.robot, n, spread) for _, member in members]
-            times = [
-                [clock(member, at[i]) for i, (_, member) in enumerate(members)] for _ in range(8)
-            ]
-            medians.append([np.median([turn[i] for turn in times]) for i in range(len(members))])
-        found[family] = [
-            (x, easy, saturated) for (x, _), easy, saturated in zip(members, *medians, strict=True)
-        ]
-    return found
-
-
-def plot(curves: dict[str, list[tuple[float, ...]]]) -> None:
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(
-        1, len(curves), figsize=(11, 3.4), constrained_layout=True, sharey=True
-    )
-    figure.suptitle("Control step of the compiled backend")
-    top = 1.1 * max(max(row[1:]) for rows in curves.values() for row in rows)
-    for ax, (family, rows) in zip(axes, curves.items(), strict=True):
-        x, easy, saturated = np.array(rows).T
-        ax.plot(x, easy, "o-", label="easy")
-        ax.plot(x, saturated, "s-", label="saturated")
-        ax.set(xlabel=family, ylim=(0, top), xticks=x)
-        ax.grid(alpha=0.3)
-    axes[0].set(ylabel="median control step [µs]", xticks=[4, 16, 32, 64])
-    axes[0].legend()
-    figure.savefig(Path(__file__).with_suffix(".png"), dpi=120)
+        control, sim = controller(robot), fb.Simulation(robot)
+        times = np.empty((turns, 2))
+        for turn in times:
+            for i, loop in enumerate((bare, fb.rollout)):
+                sim.reset()
+                turn[i] = 1e6 * sim.timestep * work(loop, sim, control, 1.0)
+        ratio = np.median(times[:, 0] / times[:, 1])
+        yield [name, *microseconds(np.median(times, axis=0)), f"{ratio:.2f}"]
 
 
 def main() -> None:
     parser = harness.command_line(__doc__, states=(400, "random states for each row of a table"))
-    parser.add_argument(
-        "--joint-limits", action="store_true", help="only measure the cost of joint limits"
-    )
-    options = parser.parse_args()
-    if options.joint_limits:
-        harness.table(
-            "robot | states | without, median | hard, ratio | soft, ratio",
-            joint_limits(options.states),
-        )
-        return
-    few = options.states // 4
-    curves = growth(few)
-    plot(curves)
+    few = parser.parse_args().states // 4
     harness.write(
         __file__,
         "Computing time of a control step",
@@ -293,7 +259,7 @@ def main() -> None:
         harness.table(
             "robot | states | active rows | compiled median | compiled p99 | reference median | "
             "reference p99 | speed-up",
-            tick_times(options.states),
+            tick_times(4 * few),
         ),
         "Parts of the compiled control step (stopped after each part, best of 5, median over "
         "states):",
@@ -304,17 +270,21 @@ def main() -> None:
         ),
         "User-defined terms, called at every control step beside the compiled code (median):",
         harness.table(
-            "robot | states | built-in tasks | user-defined task | user-defined task and 2 "
-            "inequalities | user-defined constraint | user-defined task, reference",
+            "robot | states | built-in tasks | user-defined task | user-defined constraint | "
+            "user-defined task, reference",
             own(few),
         ),
         "Each task, inequality or constraint added to `standing_tasks` (median):",
         harness.table("robot | added | without | with | ratio", one_more_task(few)),
-        "Growth of the median control step (tick.png):",
-        harness.table(
-            "what | number | easy | saturated",
-            ([what, x, *microseconds(row)] for what, rows in curves.items() for x, *row in rows),
-        ),
+        "Other problems, relative to the weighted control step without joint limits on the same "
+        "backend (median):",
+        harness.table("robot | problem | backend | without | with | ratio", other_problems(few)),
+        "20,000 control steps, with garbage collection, and as many calls of an empty function:",
+        harness.table("robot | what | median | p99 | worst", worst_steps(20_000)),
+        "Rollouts: a robot stands at 1 kHz. `fb.rollout` has checks, a record and fall detection. "
+        "The bare loop only reads the state,\ncalls the controller and advances MuJoCo. The ratio "
+        "is the speed of `fb.rollout` divided by that of the bare loop.",
+        harness.table("robot | bare loop | `fb.rollout` | ratio", rollouts(few // 4)),
     )
 
 

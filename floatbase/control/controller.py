@@ -591,18 +591,18 @@ class WholeBodyController:
         targets_of_tick = inputs.packed[: tick.layout.size]
         targets_of_tick.setflags(write=False)  # not `packed` itself: numba compiles for each kind
         problem = self._problem
-        return Command(
-            tau=result[tick.tau],
-            qdd=result[tick.qdd],
-            forces=result[tick.forces],
-            contacts=problem.contacts,
-            backend="compiled",
-            solver="compiled",
-            solution=partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
-            softened=self._softened,
-            target_values=targets_of_tick,
-            target_entries=tick.layout.names,
-            joint_limits=problem.limits.joint_limits,
+        return Command(  # in the order of its parameters: names would take 0.25 µs
+            result[tick.tau],
+            result[tick.qdd],
+            result[tick.forces],
+            problem.contacts,
+            "compiled",
+            "compiled",
+            partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
+            self._softened,
+            targets_of_tick,
+            tick.layout.names,
+            problem.limits.joint_limits,
         )
 
     def _reference_attempt(self, step: _Step) -> Command | None:

@@ -35,32 +35,6 @@ _LIBRARIES = (
     Path("/usr/wasm32-wasi/lib/wasm32-wasi/libc.a"),
 )
 _LINKERS = ("wasm-ld", *(f"wasm-ld-{version}" for version in range(25, 13, -1)))
-# numba's helper that checks whether an array can be reshaped without a copy. The tick reshapes
-# only contiguous arrays, whose new strides follow from the new shape: (ndim, shape, strides, new
-# ndim, new shape, new strides, item size, is Fortran order) -> 1 if possible
-_RESHAPE = """
-define i32 @numba_attempt_nocopy_reshape(
-    i64 %nd, ptr %dims, ptr %strides, i64 %n, ptr %shape, ptr %result, i64 %item, i32 %fortran) {
-entry:
-  br label %test
-test:
-  %i = phi i64 [ %n, %entry ], [ %at, %step ]
-  %stride = phi i64 [ %item, %entry ], [ %next, %step ]
-  %more = icmp sgt i64 %i, 0
-  br i1 %more, label %step, label %end
-step:
-  %at = sub i64 %i, 1
-  %index = trunc i64 %at to i32
-  %place = getelementptr i64, ptr %result, i32 %index
-  store i64 %stride, ptr %place, align 8
-  %from = getelementptr i64, ptr %shape, i32 %index
-  %length = load i64, ptr %from, align 8
-  %next = mul i64 %stride, %length
-  br label %test
-end:
-  ret i32 1
-}
-"""
 
 
 def linker() -> str | None:
@@ -147,7 +121,7 @@ def _write_objects(paths: list[Path]) -> None:
     vector, matrix = np.zeros(3), np.zeros((1, 1))
     targets = (0.0, vector, vector, vector, matrix, matrix, vector)
     codes = [
-        _wasm_code(tick.tick.py_func, _tick_arguments(), ENTRIES[0]) + _RESHAPE,
+        _wasm_code(tick.tick.py_func, _tick_arguments(), ENTRIES[0]),
         _wasm_code(compiled_targets.write_targets.py_func, targets, ENTRIES[1]),
     ]
     llvm.initialize_all_targets()
@@ -182,7 +156,6 @@ def _wasm_code(function: Any, arguments: tuple[Any, ...], entry: str) -> str:
     code = re.sub(
         r"^declare.*@x86_.*$", lambda found: found[0].replace("immarg", ""), code, flags=re.M
     )
-    code = re.sub(r"^declare i32 @numba_attempt_nocopy_reshape\(.*$", "", code, flags=re.M)
     return code.replace(f"@{name}(", f"@{entry}(")
 
 

@@ -167,6 +167,8 @@ class CompiledTick:
             joint_weight is not None
         )
         self._sizes = self._workspace_sizes(self.tables[0], self.default_inputs.packed.size)
+        # without user-defined inequalities
+        self._result_size = self.forces.stop + 2 * self._n_multipliers + 2 * d * self._has_soft
 
     def workspace(self, inputs: TickInputs | None = None) -> tuple[Array, Indices]:
         """Return this thread's memory for one tick with these inputs or the default ones."""
@@ -292,9 +294,9 @@ class CompiledTick:
 
     def empty_result(self, inputs: TickInputs) -> Array:
         """Return an uninitialized array for the numbers of one tick."""
-        size = self.forces.stop + 2 * self._n_multipliers
-        if self._has_soft:
-            size += 2 * self._problem.robot.d + sum(self._group_sizes(inputs))
+        size = self._result_size
+        if self._has_soft and inputs.inequalities:
+            size += sum(self._group_sizes(inputs))
         return np.empty(size)
 
     def qp(self, q: Array, v: Array, t: float, inputs: TickInputs) -> QP:

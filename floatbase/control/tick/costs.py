@@ -205,11 +205,11 @@ def posture_error(tree, q, v, target, base, e, e_dot):
 
 @jit
 def contact_costs(A, b, weight, space: Parametrisation, R):
-    """Clear R, and write (weight / 2) ‖A q̈ - b‖² of soft contacts, eq. (5), into its first rows.
+    """Write (weight / 2) ‖A q̈ - b‖² of soft contacts, eq. (5), into the first rows of R.
 
     Returns the number of these rows.
     """
-    clear(R)
+    clear(R[: b.size])
     add_product(A, space.V, space.beta_index, R, 0)
     root, last = np.sqrt(weight), R.shape[1] - 1
     for i in range(b.size):
@@ -221,8 +221,9 @@ def contact_costs(A, b, weight, space: Parametrisation, R):
 
 @jit
 def moment_rows(contacts: ContactTable, target, factor, space: Parametrisation, nv, R, row):
-    """Add the horizontal moment of all forces about a point, times a factor, to two rows of R."""
+    """Write the horizontal moment of all forces about a point, times a factor, to two rows of R."""
     V, beta_index = space.V, space.beta_index
+    clear(R[row : row + 2])
     for i in range(contacts.points.shape[0]):
         x, y, z = times(factor, minus(row_part(contacts.positions, i, 0), target))
         force = nv + int(contacts.points[i, 3])
@@ -259,6 +260,7 @@ def task_costs(
             if not valid:
                 return -1
             root = np.sqrt(w)
+            clear(R[used : used + 3])
             for r in range(3):
                 for c in range(nv):
                     rows[r, c] *= root
@@ -285,7 +287,9 @@ def task_costs(
                 weighted[first + j] += w * desired
     used = user_task_costs(used, tasks, space, nv, R)
     used = single_entry_costs(used, weights, weighted, space, cost)
-    return 4 * ((used + 3) // 4)
+    multiple = 4 * ((used + 3) // 4)
+    clear(R[used:multiple])
+    return multiple
 
 
 @jit
@@ -307,6 +311,7 @@ def user_task_costs(used, tasks: TaskTable, space: Parametrisation, nv, R):
     """Add (weight / 2) ‖A x + b‖² of user-defined tasks to R; return the number of rows in use."""
     inputs, at, V, T = tasks.targets, tasks.user_start, space.V, space.T
     k, d, nb = V.shape[0] - nv, T.shape[0], V.shape[1] - 1
+    clear(R[used : used + tasks.n_user_rows])
     for _ in range(tasks.n_user):
         block, m, root = int(inputs[at]), int(inputs[at + 1]), np.sqrt(inputs[at + 2])
         size, at = group_size(block, nv, k, d), at + 3

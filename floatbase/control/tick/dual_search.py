@@ -4,8 +4,9 @@ Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequali
 violated inequality after another to its bound. An inequality that is never violated is only
 evaluated. The multiplier of a soft inequality is at most its weight. At its weight, the inequality
 leaves the active set, and its penalty becomes part of the cost. Newton's method recovers the last
-digits. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu their
-multipliers.
+digits. What runs for every inequality is inlined, since a call passes a hundred numbers that
+describe arrays. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu
+their multipliers.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from floatbase.control.tick.inequalities import (
     violated_row,
     weight_of_row,
 )
-from floatbase.control.tick.jit import jit
+from floatbase.control.tick.jit import jit, jit_forceinline
 from floatbase.control.tick.workspace import clear, largest, take_matrix, take_vector
 from floatbase.qp import FEASIBILITY_TOLERANCE
 
@@ -53,21 +54,20 @@ class ActiveSet(NamedTuple):
 
 
 @jit
-def cholesky(H, L):
-    """Write L (nb, nb) with L Lᵀ = H; return False if the cost is flat along a direction.
+def cholesky(L):
+    """Replace H in the lower triangle of L (nb, ·) by the L with L Lᵀ = H.
 
-    Only the lower triangle of H is read.
+    Returns False if the cost is flat along a direction.
     """
     n = L.shape[0]
-    clear(L)
     for j in range(n):
         for i in range(j, n):
-            total = H[i, j]
+            total = L[i, j]
             for c in range(j):
                 total -= L[i, c] * L[j, c]
             if i > j:
                 L[i, j] = total / L[j, j]
-            elif total <= PIVOT_TOLERANCE * H[j, j]:
+            elif total <= PIVOT_TOLERANCE * L[j, j]:
                 return False
             else:
                 L[j, j] = np.sqrt(total)
@@ -103,7 +103,7 @@ def invert_lower(L, W):
             W[i, c] /= L[i, i]
 
 
-@jit
+@jit_forceinline
 def add_row(W, U, d, z, q):
     """Reflect rows q: of W so that d = W row is zero after entry q, and make d column q of U.
 
@@ -149,7 +149,7 @@ def drop_row(active: ActiveSet, at, q):
             W[j, i], W[j + 1, i] = c * a + s * b, c * b - s * a
 
 
-@jit
+@jit_forceinline
 def multiply_by_row(W, row, d):
     """Write d (nb,) = W row.
 
@@ -171,7 +171,7 @@ def multiply_by_row(W, row, d):
         d[r] = a * W[r, i] + b * W[r, j] + row[k] * W[r, k]
 
 
-@jit
+@jit_forceinline
 def step_directions(W, U, d, q, z, r):
     """Write how β and the multipliers change as the multiplier of a new row grows by 1.
 
@@ -221,7 +221,7 @@ def add_penalties(limits: Inequalities, space: Parametrisation, nv, row, grad):
                 grad[c] -= weight * row[c]
 
 
-@jit
+@jit_forceinline
 def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: Inequalities, beta):
     """Bring one violated inequality to its bound; drop those whose multiplier would turn negative.
 
@@ -360,7 +360,7 @@ def dual_search(
     """
     nb, d, k = beta.size, limits.torque_limits.size, space.V.shape[0] - nv
     H, grad = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb)
-    L = take_matrix(workspace, nb, nb)
+    L = H[:nb]
     W, U = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
     rows = take_matrix(workspace, nb, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
@@ -372,7 +372,7 @@ def dual_search(
     has_soft = limits.saturated.size > 0
     clear(limits.saturated)
     hessian(cost, H, grad)
-    if not cholesky(H, L):
+    if not cholesky(L):
         return INACCURATE
     solve_cholesky(L, grad, beta)
     q, refined, moved, number, has_factors = 0, 0, 0.0, 0, False

@@ -133,7 +133,7 @@ def workspace_sizes(
     space = (n + d) * (n + 1)
     n_rows = 3 * n_tasks + n_user_rows + m + 2 * d + k + 5
     cost = n_rows * (n + 1) + 3 * nv + 2 * d + 2 * (n + d)
-    search = (n + 1) ** 2 + 4 * n * n + 8 * n + k + 3 * d + nv + 3 * (n + 1) + n_inputs
+    search = (n + 1) ** 2 + 3 * n * n + 8 * n + k + 3 * d + nv + 3 * (n + 1) + n_inputs
     return 1 + contact + elimination + space + cost + search, 3 + (m + base) + 3 * n
 
 
@@ -167,10 +167,10 @@ def write_result(space: Parametrisation, beta, active, n_active, nv, result):
     affine_value(space.V, beta, nv, n, result[nv + d : n + d])
     for i in range(n_active):
         result[2 * n + d + i] = active[i]
+    is_accurate = True
     for i in range(n + d):
-        if not abs(result[i]) <= MAX_ENTRY:  # nor is NaN
-            return False
-    return True
+        is_accurate &= abs(result[i]) <= MAX_ENTRY  # nor is NaN
+    return is_accurate
 
 
 def make_tick(digest):
