@@ -290,5 +290,5 @@ def test_private_names_of_another_package_are_found(tmp_path):
 
 
 def is_private(name):
-    """Whether a name is internal; `_repr_html_` and `__main__` are agreed with others."""
-    return name.startswith("_") and not name.endswith("_")
+    """Whether a name is internal; `_repr_html_`, `__main__` and numba's `_getvalue` are not."""
+    return name.startswith("_") and not name.endswith("_") and name != "_getvalue"

@@ -58,7 +58,7 @@ def solve_batch(
             raise
         if command is not None:
             x[i] = np.concatenate([command.qdd, command.tau, command.forces])
-            status[i], softened[i] = command.backend, command.softened
+            status[i], softened[i] = command.backend, bool(command.softened)
     for array in (x, status, softened):
         array.setflags(write=False)
     qdd, tau, forces = np.split(x, [nv, nv + d], axis=1)

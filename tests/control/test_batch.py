@@ -70,7 +70,7 @@ def check(controller, Q, V, t=0.0, targets=None, threads=3):
             continue
         for name in ("tau", "qdd", "forces"):
             assert getattr(batch, name)[i].tobytes() == getattr(command, name).tobytes()
-        assert (batch.status[i], batch.softened[i]) == (command.backend, command.softened)
+        assert (batch.status[i], batch.softened[i]) == (command.backend, bool(command.softened))
     return batch
 
 

@@ -170,11 +170,10 @@ class CompiledTick:
         # without user-defined inequalities
         self._result_size = self.forces.stop + 2 * self._n_multipliers + 2 * d * self._has_soft
 
-    def workspace(self, inputs: TickInputs | None = None) -> tuple[Array, Indices]:
-        """Return this thread's memory for one tick with these inputs or the default ones."""
-        sizes, default = self._sizes, self.default_inputs.packed.size
-        if inputs is not None and (inputs.n_user_rows or inputs.packed.size != default):
-            n_inputs, n_user_rows = inputs.packed.size, inputs.n_user_rows
+    def workspace(self, n_inputs: int = 0, n_user_rows: int = 0) -> tuple[Array, Indices]:
+        """Return this thread's memory for one tick with as many inputs or the default ones."""
+        sizes = self._sizes
+        if n_user_rows or n_inputs > self.default_inputs.packed.size:
             sizes = self._workspace_sizes(self.tables[0], n_inputs, n_user_rows)
         floats, ints = _memory.arrays
         if floats.size < sizes[0] or ints.size < sizes[1]:
@@ -183,7 +182,8 @@ class CompiledTick:
 
     def run(self, q: Array, v: Array, inputs: TickInputs, n_stages: int) -> tuple[Array, int]:
         """Run the first stages of one tick; return its numbers, and the number of active rows."""
-        result, workspace = self.empty_result(inputs), self.workspace(inputs)
+        result = self.empty_result(inputs)
+        workspace = self.workspace(inputs.packed.size, inputs.n_user_rows)
         n_active = self._tick(q, v, inputs.packed, *self.tables, *workspace, result, n_stages)
         return result, n_active
 
@@ -226,7 +226,7 @@ class CompiledTick:
             if not self.user_terms.varies and targets is not None:
                 packed = np.tile(self.default_inputs.packed, (rows.stop - rows.start, 1))
                 packed[:, : self.layout.size] = targets[rows] if one_row_each else targets
-                return [TickInputs(row) for row in packed]
+                return [TickInputs(row, *self.default_inputs[1:]) for row in packed]
             all_inputs = []
             for i in range(rows.start, rows.stop):
                 of_row = targets[i] if targets is not None and one_row_each else targets
@@ -240,11 +240,14 @@ class CompiledTick:
             """Run the ticks of some rows, in any thread."""
             stops = np.cumsum([each.packed.size for each in inputs])
             starts = np.append(0, stops[:-1])
+            n_inputs, n_user_rows = np.max(
+                [(each.packed.size, each.n_user_rows) for each in inputs], axis=0
+            )
             run_ticks(
                 self._tick, Q[rows], V[rows], np.resize(starts, rows.stop - rows.start),
                 np.resize(stops, rows.stop - rows.start), results[rows], codes[rows],
                 np.concatenate([each.packed for each in inputs]), *self.tables,
-                *self.workspace(max(each.n_user_rows for each in inputs)),
+                *self.workspace(int(n_inputs), int(n_user_rows)),
                 max(map(self.empty_result, inputs), key=len), self._n_stages,
             )  # fmt: skip
 

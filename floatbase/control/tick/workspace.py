@@ -5,6 +5,8 @@ workspace: one array of real numbers or of integers; its first entry counts how 
 
 from __future__ import annotations
 
+from typing import Any
+
 from numba import types
 from numba.core.cgutils import create_struct_proxy
 from numba.extending import intrinsic
@@ -13,8 +15,7 @@ from numba.np.arrayobj import populate_array
 from floatbase.control.tick.jit import jit, jit_inline
 
 
-@intrinsic
-def as_matrix(_, array, rows, columns):
+def _as_matrix(_, array, rows, columns):
     """Return the numbers of a C-contiguous array as a matrix (rows, columns).
 
     `reshape` calls a function of numba for this, and takes a twentieth of a tick.
@@ -31,6 +32,9 @@ def as_matrix(_, array, rows, columns):
         return result._getvalue()
 
     return matrix(array, types.intp, types.intp), build
+
+
+as_matrix: Any = intrinsic(_as_matrix)
 
 
 @jit_inline
