@@ -1,6 +1,4 @@
-"""Problems for the comparison of floatbase with its C++ peers.
-
-The problems are stated so that each library can express them.
+"""The problems of the comparison with TSID and placo, stated so that each library can express them.
 
 Common to all: keep standing on all feet (centre of mass, base orientation, posture, with the gains
 and weights of `fb.standing_tasks`, except for the posture's weight, 0.1), four friction facets

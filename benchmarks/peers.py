@@ -167,8 +167,8 @@ def measure(peer: str, python: Path, n: int, rounds: int) -> Iterator[Row]:
 
 def torque_table(rows: Sequence[Row]) -> str:
     return harness.table(
-        "robot | peer | states | compared | no answer: ours, peer | largest difference "
-        "| from our reference",
+        "robot | peer | states | compared | no answer: floatbase, peer | largest difference "
+        "| from the reference backend",
         (
             [row.robot, row.peer, row.label, row.states]
             + [row.missing, f"{row.difference:.1e} N·m", f"{row.within:.1e} N·m"]
