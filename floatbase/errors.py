@@ -49,8 +49,8 @@ class InfeasibleError(FloatbaseError):
     Parameters
     ----------
     message : str or callable
-        Message of the exception, or a function that returns an `InfeasibleError`. It is called when
-        the message or the constraints are read, because the search for a conflict is slow.
+        Message of the exception, or a function that returns an `InfeasibleError`. The function is
+        called when the message or the constraints are read, because it searches for a conflict.
     constraints : iterable of str, optional
         Names of constraints in conflict, kept as the attribute `constraints`. Solvers of QPs name a
         minimal set: if any one of them is removed, the others can be satisfied. Other constraints

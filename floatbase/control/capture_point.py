@@ -90,7 +90,7 @@ class CapturePointRows:
 
 
 def support_corners(points: Array) -> list[int]:
-    """Return which points, (n, 2 or more), are corners of the support polygon, in their order."""
+    """Return the sorted indices of those points, (n, 2 or more), that are corners of the hull."""
     corner, corners = first_corner(points), list[int]()
     while corner not in corners:
         corners.append(corner)
@@ -101,7 +101,8 @@ def support_corners(points: Array) -> list[int]:
 def _edges(points: Array) -> tuple[Array, Array]:
     """Return n and d of the half-planes n · x ≤ d whose intersection is the support polygon.
 
-    They are in the order of the points at which their edges start, counter-clockwise.
+    The half-planes are in the order of the points at which their edges start. Each edge ends at the
+    next corner counter-clockwise.
     """
     corners = support_corners(points)
     if len(corners) < 3:

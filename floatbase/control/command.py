@@ -38,11 +38,11 @@ class Command(Value):
     solver : str
         Solver that found the answer: "compiled", or the solver of the reference backend. "daqp
         unrefined" means that the last digits are lost. "level 1 of 3" means that the levels after
-        the first could not be solved within a control step.
+        the first could not be solved within the limit of iterations.
     solution : Solution or callable
         Value of the property `solution`, or a function that computes it on first use.
     softened : tuple of str, optional
-        What was made soft because the QP had no solution: "limits", "contacts", or both.
+        What was softened because the QP had no solution: "limits", "contacts", or both.
     target_values : ndarray, shape (n,), optional
         Targets of all tasks in this control step, as `WholeBodyController.targets_at` returns them.
     target_entries : mapping of str to slice, optional
@@ -172,7 +172,7 @@ class CommandBatch(Value):
         no solution, and "failed" that the solver stopped without one. A call of the controller with
         this state raises an exception with the reasons.
     softened : ndarray of bool, shape (N,)
-        Whether limits, or limits and contacts, were made soft because the QP had no solution.
+        Whether limits or contacts were softened because the QP had no solution.
     """
 
     tau: Array

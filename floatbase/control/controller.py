@@ -123,10 +123,10 @@ class WholeBodyController:
     on_infeasible : {"raise", "soften"}, optional
         What to do if the QP has no solution. "raise" raises `InfeasibleError`. "soften" solves
         again with soft joint limits, user-defined inequalities and bounds of normal forces (weight
-        1e4), and sets `Command.softened`. `Command.violations` lists the violations. If there is
-        still no solution, the contacts become soft as well (contact_weight=1e4). The equations
-        of motion, friction and torque limits always hold. The compiled backend softens at once,
-        without confirmation by the reference backend.
+        1e4). If there is still no solution, the contacts become soft as well (contact_weight=1e4).
+        `Command.softened` names what was softened, and `Command.violations` lists the violations.
+        The equations of motion, friction and torque limits always hold. The compiled backend
+        softens at once, without confirmation by the reference backend.
     modify_qp : callable, optional
         Function (qp, eom) -> QP that changes the problem before it is solved. It is called at every
         control step with the assembled `floatbase.qp.QP` in x = (q̈, τ, λ) and the
@@ -169,12 +169,12 @@ class WholeBodyController:
     compiled backend finds no answer at a state, or none that is accurate to the last digits, the
     reference backend takes over. `Command.backend` and `Command.solver` say what answered.
 
-    A control step takes a few milliseconds at most, because the iterations of both backends are
-    limited. Beyond the limit, a step of the reference backend ends with DAQP's unrefined result,
-    with the answer of the priority levels before, or with a `SolverError`. Softer controllers
-    follow with `on_infeasible="soften"`. The conflict that an `InfeasibleError` names is found when
-    its message is read. Only a call with `backend="reference"` has no limit, and may fall back to
-    the slow solver "active_set"; `attempt` is limited there, too.
+    The iterations of a control step are limited, so that the solver takes a few milliseconds at
+    most. Beyond the limit, a step of the reference backend ends with DAQP's unrefined result, with
+    the answer of the priority levels before, or with a `SolverError`. Softer controllers follow
+    with `on_infeasible="soften"`. The conflict that an `InfeasibleError` names is found when its
+    message is read. A solver other than "daqp" has no limit. With `backend="reference"`, a call has
+    no limit either, and may fall back to the slow solver "active_set"; `attempt` is limited.
 
     Functions of t and user-defined objects are evaluated once when the controller is made, at t = 0
     and in the standing posture. Functions and objects must therefore be defined at t = 0, even if a
@@ -393,7 +393,7 @@ class WholeBodyController:
         return self._layout.at(as_number("t", t, "s"))
 
     def qp(self, state: State, t: float = 0.0, *, slacks: bool = True) -> QP:
-        """Return the QP of one control step, for inspection.
+        """Return the QP of one control step, for inspection or for another solver.
 
         Parameters
         ----------
@@ -444,6 +444,8 @@ class WholeBodyController:
         ------
         InfeasibleError
             If the QP has no solution, unless `on_infeasible` is "soften".
+        SolverError
+            If the reference backend finds neither a solution nor a conflict within its limit.
         """
         in_loop = self._settings.backend != "reference"
         command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
@@ -459,9 +461,8 @@ class WholeBodyController:
     ) -> Command | None:
         """Compute the command of one control step, or return None if the QP has no solution.
 
-        A call raises an `InfeasibleError` instead. Unlike a call, this method does not let the
-        reference backend confirm that there is no solution, which takes milliseconds. It is
-        therefore suitable for real-time loops.
+        Use this method in real-time loops. A call raises an `InfeasibleError` instead, after the
+        reference backend has confirmed that there is no solution, which takes milliseconds.
 
         Parameters
         ----------
@@ -480,6 +481,11 @@ class WholeBodyController:
         Command or None
             Torques, with the forces and accelerations planned with them. With
             `on_infeasible="soften"`, the command may be softened.
+
+        Raises
+        ------
+        SolverError
+            If the reference backend finds neither a solution nor a conflict within its limit.
 
         Notes
         -----

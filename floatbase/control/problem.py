@@ -201,8 +201,8 @@ class Problem(Value):
         solver : str, optional
             QP solver, one of `floatbase.qp.solvers()`.
         in_loop : bool, optional
-            Whether to limit the iterations of "daqp" as in a control step, without a fallback. If a
-            level after the first has no answer then, it is missing from the list.
+            Whether to limit the iterations of "daqp" as in a control step, without a fallback. The
+            list then ends before a level, after the first, that has no answer within the limit.
 
         Returns
         -------

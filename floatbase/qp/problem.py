@@ -185,7 +185,7 @@ class QP(Value):
         if not s:
             return self
         if "slacks" in self.blocks:
-            raise InputError('A problem with soft inequalities needs a free name "slacks".')
+            raise InputError('Rename the block "slacks": with_slacks needs this name.')
         assert self.penalties is not None
         m, rows = len(self.A), len(self.G)
         H, A, G = np.zeros((n + s, n + s)), np.zeros((m, n + s)), np.zeros((rows + s, n + s))

@@ -175,8 +175,8 @@ def push_recovery(
     observation_time : float, optional
         Time after the push [s]. A fall is noticed only if it happens within this time.
     resolution : float, optional
-        Spacing of the pushes to try [N]: all pushes are multiples of it. The first one is the
-        robot's weight, and it is doubled as long as it is survived.
+        Spacing of the pushes to try [N]: all pushes are multiples of it. The first push is
+        the robot's weight, rounded up. It is doubled as long as it is survived.
     workers : int, optional
         Number of processes, as for `fb.sweep`; each direction is a point of the sweep.
     cluster : distributed.Client or str, optional
