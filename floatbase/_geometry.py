@@ -74,7 +74,7 @@ def first_corner(points: Array) -> int:
 def next_corner(points: Array, i: int) -> int:
     """Return the index of the corner after corner i, counter-clockwise; i if there is no other.
 
-    Points on an edge are no corners. Points nearer to each other than `MIN_EDGE` are one corner.
+    Points on an edge are not corners. Points nearer to each other than `MIN_EDGE` are one corner.
     """
     found, x, y, length = i, 0.0, 0.0, 0.0  # direction and distance of the point found
     for k in range(len(points)):

@@ -4,9 +4,9 @@ Source: [GoldfarbIdnani1983]_. The search starts at the optimum without inequali
 violated inequality after another to its bound. An inequality that is never violated is only
 evaluated. The multiplier of a soft inequality is at most its weight. At its weight, the inequality
 leaves the active set, and its penalty becomes part of the cost. Newton's method recovers the last
-digits. What runs for every inequality is inlined, since a call passes a hundred numbers that
-describe arrays. Symbols: nb entries of β, H the Hessian, q the number of active inequalities, mu
-their multipliers.
+digits. Functions that run for every inequality are inlined, since a call passes a hundred numbers
+that describe arrays. Symbols: nb entries of β, H the Hessian, q the number of active inequalities,
+mu their multipliers.
 """
 
 from __future__ import annotations

@@ -195,8 +195,8 @@ def capture_point_rows(bodies: Bodies, points, rows):
     """Write n · c̈ ≤ h for each edge of the support polygon, as `CapturePointRows` does.
 
     rows: margin, horizon and gravity; receives n for the edge that starts at each of the points,
-    (P, 2), then h, (P,), and zeros for points that are no corners. Returns False if the polygon has
-    no interior, or if the centre of mass is not above it.
+    (P, 2), then h, (P,), and zeros for points that are not corners. Returns False if the polygon
+    has no interior, or if the centre of mass is not above it.
     """
     margin, horizon, gravity = rows[0], rows[1], rows[2]
     n, height = points.shape[0], 0.0

@@ -32,8 +32,8 @@ def run_ticks(
 def compiled_loop(tick: Any) -> Any:
     """Compile `run_ticks` for a compiled tick.
 
-    The loop calls the tick through its address. The tick is therefore not compiled again, the
-    answers are those of single ticks to the bit, and compilation takes 0.2 s.
+    The loop calls the tick through its address, so the tick is not compiled again, and the answers
+    are those of single ticks to the bit. Compiling the loop takes some tenths of a second.
     """
     arguments = tick.nopython_signatures[0].args
     matrix, integers = types.float64[:, ::1], types.int64[::1]

@@ -135,7 +135,7 @@ def pack_problem(problem: Problem, layout: TargetLayout) -> tuple[Indices, Indic
 
 
 def contact_numbers(contacts: Indices, nv: int) -> int:
-    """Return how many of a tick's inputs are of contacts. contacts: table of `ContactTable`."""
+    """Return how many of a tick's inputs belong to contacts. contacts: table of `ContactTable`."""
     user = contacts[contacts[:, 1] == USER_DEFINED]
     matrices = sum(m * (nv + 1) + k * nv + 3 * n for n, m, k in user[:, 3:6])
     return int(matrices + 3 * np.sum(contacts[:, 1] == DRIVEN_FRAME))
