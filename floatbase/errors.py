@@ -84,7 +84,7 @@ class InfeasibleError(FloatbaseError):
         return super().__repr__()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (str(self), self.constraints)
+        return type(self), (str(self), self.constraints), vars(self)  # which holds the notes
 
 
 class SolverError(FloatbaseError):

@@ -517,7 +517,7 @@ class WholeBodyController:
     ) -> CommandBatch:
         """Compute the commands of many states, in several threads.
 
-        Each row is identical to the bit to a call with this state, but a state without a solution
+        Each row is identical to the bit to `attempt` with this state. A state without a solution
         raises no exception. The compiled backend runs in the threads. User-defined functions and
         the reference backend run in the calling thread, one state after another.
 

@@ -284,6 +284,35 @@ def test_infeasible_problems_are_reported_by_both_with_the_same_rows():
             both[0](state.q, state.v)
 
 
+class Entries:
+    """A user-defined task that leaves nearly all of its block open."""
+
+    weight = 1e-4
+
+    def __init__(self, block, rows):
+        self.block, self.name, self.rows = block, block, rows
+
+    def residual(self, eom, t=0.0):
+        return fb.Affine(self.rows, np.ones(len(self.rows)))
+
+
+@pytest.mark.parametrize("name", ["go2", "solo12"])
+def test_rows_with_hardly_any_curvature_are_no_conflict(name):
+    """The rows of forces that are nearly undetermined seem to depend on one another."""
+    robot = judges.load(name)
+    open_tasks = [Entries("forces", np.ones((1, 9))), Entries("tau", np.eye(12)[:2])]
+    controller = fb.WholeBodyController(
+        robot,
+        fb.Contacts.points(robot).without(robot.feet[3].frame),
+        [*fb.standing_tasks(robot.standing()), *open_tasks],
+        torque_limits=0.3 * robot.torque_limits,
+    )
+    for state in judges.near_and_far(name, 8):
+        if controller.attempt(state.q, state.v) is None:
+            with pytest.raises(InfeasibleError):
+                controller(state.q, state.v)
+
+
 def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference_backend():
     """solo8 on four feet: J allows a velocity to first order, but its curvature J̇ v forbids it."""
     robot = judges.load("solo8")

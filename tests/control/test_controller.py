@@ -417,6 +417,8 @@ def test_a_conflict_that_is_read_later_survives_a_pickle():
     controller = judges.controller_of("go2", min_normal_force=500.0)
     with pytest.raises(InfeasibleError) as caught:
         controller(robot.standing().q, np.zeros(robot.nv))
+    caught.value.add_note("at state 3")
     copied = pickle.loads(pickle.dumps(caught.value))
+    assert copied.__notes__ == ["at state 3"]
     assert copied.constraints == caught.value.constraints != ()
     assert str(copied) == str(caught.value) and repr(copied) == repr(caught.value)

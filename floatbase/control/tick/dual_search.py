@@ -34,6 +34,8 @@ INACCURATE, INFEASIBLE = -2, -3
 PIVOT_TOLERANCE = 1e-13
 # fraction of a row, squared, outside the active rows: with less, it depends on them
 DEPENDENCE_TOLERANCE = 1e-12
+# a contradiction counts only if it cannot be resolved by a β with such entries, m/s² or N
+MAX_FEASIBLE = 1e4
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 STEP_TOLERANCE = 1e-6  # fraction of β: after a step this small, only rounding remains
 MAX_FINAL_STEP = 1e-4  # fraction of β that the last step may still change
@@ -221,6 +223,25 @@ def add_penalties(limits: Inequalities, space: Parametrisation, nv, row, grad):
                 grad[c] -= weight * row[c]
 
 
+@jit
+def contradicts(row, bound, q, r, rest, active: ActiveSet):
+    """Return whether no β of realistic size satisfies row β ≤ bound and the q active inequalities.
+
+    By the lemma of Farkas: the row is Σ r rows with r ≤ 0, which is at least Σ r bounds. Rounding,
+    or little curvature, may leave a rest of the row. r: (nb,). rest: (nb,), memory.
+    """
+    gap, length = -bound, 0.0
+    for c in range(row.size):
+        rest[c] = row[c]
+    for j in range(q):
+        gap += r[j] * active.bounds[j]
+        for c in range(row.size):
+            rest[c] -= r[j] * active.rows[j, c]
+    for c in range(row.size):
+        length += abs(rest[c])
+    return gap > MAX_FEASIBLE * length
+
+
 @jit_forceinline
 def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: Inequalities, beta):
     """Bring one violated inequality to its bound; drop those whose multiplier would turn negative.
@@ -254,7 +275,7 @@ def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: I
         )
         step = min(partial_step, full_step, weight - multiplier)
         if step == np.inf:
-            return INFEASIBLE
+            return INFEASIBLE if contradicts(row, bound, q, r, z, active) else INACCURATE
         for j in range(q):
             mu[j] -= step * r[j]
         multiplier += step
