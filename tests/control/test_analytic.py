@@ -1,7 +1,5 @@
 """The analytic controller (§3.1): the robot stands, the answer is optimal, and fails as in §4."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import cvxpy as cp

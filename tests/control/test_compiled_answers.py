@@ -1,7 +1,5 @@
 """The compiled backend against the reference backend: same torques, verdicts and messages."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The whole-body controller (26)(27) against cvxpy, forward dynamics and closed forms."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import re

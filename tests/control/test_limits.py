@@ -3,8 +3,6 @@
 They are respected, named when they conflict, and refused if they do not fit.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges

@@ -1,7 +1,5 @@
 """Errors of tasks, limits and controllers: their types, and the names and numbers in them."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace

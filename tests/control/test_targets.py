@@ -1,7 +1,5 @@
 """Targets as an array, and attempts that say no without reasons."""
 
-from __future__ import annotations
-
 import time
 
 import judges

@@ -1,7 +1,5 @@
 """Quadratic programs: solvers agree, answers prove themselves, infeasible problems say why."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from dataclasses import dataclass, field, replace
