@@ -7,12 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from floatbase.simulation import (
-    FALLEN_COSINE,
-    FALLEN_HEIGHT_FRACTION,
-    Simulation,
-    joint_damping,
-)
+from floatbase.simulation import FALLEN_COSINE, FALLEN_HEIGHT_FRACTION, Simulation, joint_damping
 
 # fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
 # hulls of the links have them, on which a fallen robot lies
