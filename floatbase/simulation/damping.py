@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from floatbase._validation import Array
+from floatbase._validation import Array, as_instance, as_positive
 from floatbase.robots import State
 
 # s: time constant with which the damping stops a joint if nothing else moves it
@@ -28,6 +28,12 @@ def joint_damping(state: State, period: float) -> Array:
     -------
     ndarray, shape (d,)
         Damping of each joint [N·m·s/rad].
+
+    Raises
+    ------
+    InputError
+        If an argument is of the wrong type, or if the period is not positive.
     """
-    inverse_inertia = np.diag(np.linalg.inv(state.M))[state.robot.nv - state.robot.d :]
+    M, period = as_instance("state", state, State).M, as_positive("period", period, "s")
+    inverse_inertia = np.diag(np.linalg.inv(M))[state.robot.nv - state.robot.d :]
     return np.array(1.0 / (max(_TIME_CONSTANT, 2.0 * period) * inverse_inertia))
