@@ -5,8 +5,6 @@ README and the lock are used. The base install must print what the README says, 
 of the course, use the compiled controller, and not compile what the wheel contains compiled.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -6,8 +6,6 @@ that a live robot replaces are checked without its script, then every robot must
 how long each page's first picture took and what was found.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ code writes, and the size of the code.
 nothing and needs no network.
 """
 
-from __future__ import annotations
-
 import ast
 import json
 import os

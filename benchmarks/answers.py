@@ -7,8 +7,6 @@ accelerations and forces from both backends, for every robot in the catalogue an
 also cover the records of rollouts, walks and a jump.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 

@@ -13,8 +13,6 @@ linear equations of its active rows give the last digits. Strict priorities are 
 QPs. Only the contact Jacobians are those of the package, which the tests compare with MuJoCo.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field

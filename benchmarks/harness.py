@@ -3,8 +3,6 @@
 It is imported before numpy, because a benchmark uses one thread.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 

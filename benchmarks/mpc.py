@@ -7,8 +7,6 @@ All robots and speeds use the same numbers. Friction is 0.6 in the controller an
 The control period is 2 ms. Times are processor times of the thread.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Callable, Iterator

@@ -6,8 +6,6 @@ TSID's wheel was built against an older Pinocchio than the current one and fails
 some minutes, a C++ compiler and make. placo comes as a wheel that needs Pinocchio 3.8.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -2,8 +2,6 @@
 a backend.
 """
 
-from __future__ import annotations
-
 import sys
 
 import peer_problems

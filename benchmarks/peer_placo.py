@@ -6,8 +6,6 @@ everything that would change the optimum unasked (joint limits, the default torq
 set to the problem's.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import numpy as np

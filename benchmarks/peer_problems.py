@@ -19,8 +19,6 @@ out:
 - Joint limits are off; TSID and floatbase are compared with joint limits separately.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count, islice

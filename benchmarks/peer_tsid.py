@@ -5,8 +5,6 @@ Contacts are motion constraints without gains (J q̈ = -J̇ q̇); forces are reg
 all axes (by default the normal counts a thousandth) and may be as large as they like.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 import tsid

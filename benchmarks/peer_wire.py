@@ -11,8 +11,6 @@ output:
     {"cold": label}                  the same, with 16 MB written before each tick
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -11,8 +11,6 @@ states. Blocks of control steps alternate, so that other load on the machine aff
 `peer_problems.py` describes how the problems are made equal.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

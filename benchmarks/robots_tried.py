@@ -26,8 +26,6 @@ example-robot-data are not listed. See [Your own robot](your_own_robot.md).
 - **warnings** are the first sentences of warnings, shortened.
 """
 
-from __future__ import annotations
-
 import textwrap
 import tomllib
 import warnings

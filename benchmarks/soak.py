@@ -8,8 +8,6 @@ Each soak runs in its own process. A straight line is fitted through its memory,
 file descriptors after the warm-up. The rise of this line is what counts.
 """
 
-from __future__ import annotations
-
 import gc
 import multiprocessing
 import sys

@@ -12,8 +12,6 @@ The tilt is the largest angle between the base and the vertical in runs that pas
 knows the ground leans with its slope on purpose: 18° on these stairs.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Functions that are compared run alternately on the same states. The ratios are r
 microseconds depend on the machine.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Iterator
 from typing import Any

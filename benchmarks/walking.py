@@ -7,8 +7,6 @@ Friction is 0.6 in the controller and 1 on the ground; pushes last 0.1 s. The co
 1 ms, or 2 ms where noted.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace

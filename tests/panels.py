@@ -7,6 +7,13 @@ from typing import Any
 
 from floatbase.lessons import SliderPanel, slider_samples
 
+# lowest, first and highest value of a slider, and the step that it gets
+RANGES = [
+    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05),
+    (0, 60, 80, 1.0), (0, 22, 25, 0.5), (0.0, 0.5, 1.0, 0.02), (0.0, 60.0, 120.0, 2.0),
+    (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002), (3, 4, 53, 1.0),
+    (1, 3, 24, 0.2), (0, 0, 5, 0.1), (0, 250, 5000, 50.0), (-180.0, 0.0, 180.0, 5.0),
+]  # fmt: skip
 _MADE = re.compile(r"\b(?!push_)\w+_panel\(")
 
 

@@ -107,6 +107,7 @@ def right():
         "N": np.eye(12)[:, :3],
         "x": x, "tau": x, "beta": x, "max_lever_angle": x, "scale": np.ones(12),
         "q": state.q, "v": state.v, "dv": np.zeros(18), "qdd": np.zeros(18),
+        "Q": state.q[None], "V": state.v[None],
         "forces": np.tile(30.0 * up, 4), "force": np.array([0.1, 0.0, 1.0]), "point": plane,
         "dcm_error": plane, "nominal_foothold": plane, "neutral_point.velocity": plane,
         "points": contacts.positions(state), "places": np.zeros((2, 3)),

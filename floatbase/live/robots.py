@@ -17,10 +17,16 @@ import numpy as np
 
 from floatbase._validation import Array
 from floatbase.behaviours import WEIGHT_SHIFT_TIME, Gait, Walk
+from floatbase.behaviours.walk import compiled_targets, plan
+from floatbase.behaviours.walk.gait import TIME_TOLERANCE
+from floatbase.behaviours.walk.gait_limits import speed_fractions
+from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION, WalkingPosture
+from floatbase.behaviours.walk.stance_controllers import StanceControllers
 from floatbase.control import JointLimits, WholeBodyController
 from floatbase.control.tick import CompiledTick, dynamics, tick
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
+from floatbase.live.physics import model_data
 from floatbase.live.settings import SETTINGS
 from floatbase.objectives import CoMTask, FrameTask, standing_tasks
 from floatbase.qp import QP
@@ -37,6 +43,17 @@ LIFT_HEIGHT = 0.04  # m above the ground, of a lifted foot
 _SHIFT_FRACTION = 0.8
 # largest velocity forwards [m/s] and yaw rate [rad/s] in the page, by gait: all robots can follow
 MOST = {"trot": (0.6, 0.8), "walk": (0.2, 0.15)}
+# of the plans of a walk
+_WALK_CONSTANTS = {
+    "timeTolerance": TIME_TOLERANCE,
+    "nPhases": plan.PLANNED_PHASES,
+    "horizon": plan.PLAN_HORIZON,
+    "settlingTime": plan.TOUCHDOWN_SETTLING_TIME,
+    "shiftTime": plan.WEIGHT_SHIFT_TIME,
+    "deadZone": plan.DCM_DEAD_ZONE,
+    "pathShift": plan.PATH_SHIFT_THRESHOLD,
+    "sideFraction": MIN_SIDE_FRACTION,
+}
 _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
@@ -61,7 +78,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "facets": FACETS,
         "jointNames": list(robot.joint_names),
         "torqueLimits": robot.torque_limits.tolist(),
-        **sim.page_data(),
+        **model_data(sim),
         "problems": {
             **{
                 name: _standing_problem(robot, lifted, facets)
@@ -286,6 +303,35 @@ def _walking_data(robot: Robot) -> dict[str, Any] | None:
     if not walks:
         return None
     assert all(walk.speed_fraction == 1.0 for walk in walks.values())
-    data = {name: walk.page_data() for name, walk in walks.items()}
-    gaits_data = {name: each["gait"] | {"most": MOST[name]} for name, each in data.items()}
-    return data["trot"]["plan"] | {"gaits": gaits_data}
+    posture = WalkingPosture(Contacts.feet(robot, MU), robot.standing())
+    options = walks["trot"].options
+    return {
+        "constants": _WALK_CONSTANTS,
+        # where the numbers of a plan are in the arrays of `compiled_targets`
+        "layout": {name: value for name, value in vars(compiled_targets).items() if name.isupper()},
+        "feet": {foot: nominal.tolist() for foot, nominal in posture.nominal_feet.items()},
+        "comHeight": float(posture.state.com[2]),
+        "groundHeight": posture.ground_height,
+        "baseRotation": posture.rotation("base").ravel().tolist(),
+        "reach": options.reach,
+        "clearance": options.clearance,
+        "acceleration": options.acceleration.tolist(),
+        "ramp": options.ramp,
+        "fullLoad": StanceControllers(posture, options).full_loads,
+        "gaits": {
+            name: _gait_data(walk, posture) | {"most": MOST[name]} for name, walk in walks.items()
+        },
+    }
+
+
+def _gait_data(walk: Walk, posture: WalkingPosture) -> dict[str, Any]:
+    """Return the gait of a walk, and the fraction of its velocity in the first period."""
+    gait, options = walk.gait, walk.options
+    motion = np.array([*walk.velocity, walk.yaw_rate])
+    fractions = speed_fractions(gait, posture, options.reach, motion, options.acceleration[0])
+    return {
+        "offsets": dict(gait.offsets),
+        "period": gait.period,
+        "swing": gait.swing,
+        "firstFraction": fractions[0],
+    }

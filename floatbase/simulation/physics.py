@@ -27,11 +27,9 @@ from floatbase.dynamics import UP, Contacts
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
-from floatbase.simulation.build import body_name, build_model
-from floatbase.simulation.damping import joint_damping
+from floatbase.simulation.build import body_name, build_model, build_spec
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.ground import Ground
-from floatbase.simulation.page_data import model_data
 from floatbase.simulation.push import Push, as_pushes
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
@@ -322,6 +320,16 @@ class Simulation:
         finally:
             self._thread_lock.release()
 
+    def spec(self) -> mujoco.MjSpec:
+        """Return a new description of the model, for example to write it as XML.
+
+        Returns
+        -------
+        mujoco.MjSpec
+            The description from which `model` was compiled. `sim.spec().to_xml()` is its XML.
+        """
+        return build_spec(self.robot, self.ground, self.timestep, self.joint_losses)
+
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance the simulation by one timestep.
 
@@ -471,38 +479,6 @@ class Simulation:
             f"ground there. Push a link that moves: "
             f"{', '.join(link.name for link in links if link.parentJoint > 0)}."
         )
-
-    def page_data(self) -> dict[str, Any]:
-        """Return the model in its present state, as data for the robot in a web page.
-
-        Returns
-        -------
-        dict
-            Values for JSON, named as in the page's JavaScript: MuJoCo's model as XML, the places
-            of the robot's joints and bodies in MuJoCo's arrays, and the limits of `fallen`.
-        """
-        robot, model, conversion = self.robot, self.model, self._conversion
-        joints = [model.joint(name) for name in robot.joint_names]
-        base = [self._base_body] if robot.is_floating else []
-        return {
-            **model_data(robot, self.ground, self.timestep, self.joint_losses, model),
-            "fallenHeight": FALLEN_HEIGHT_FRACTION,
-            "fallenCosine": FALLEN_COSINE,
-            "home": {"qpos": self._qpos.tolist(), "com": self.state.com.tolist()},
-            # in the package's order: entries of qpos and qvel, bodies that joints move, joints
-            "qposOfQ": conversion.qpos_of_q.tolist(),
-            "qvelOfV": conversion.qvel_of_v.tolist(),
-            "bodies": [0, *base, *(int(joint.bodyid[0]) for joint in joints)],
-            "joints": [int(joint.id) for joint in joints],
-            "motors": self._actuator_ids.tolist(),
-            "damping": joint_damping(self.state, self.timestep).tolist(),
-            "hulls": self._hull_geoms.tolist(),
-            "hullBodies": self._hull_bodies.tolist(),
-            "points": [
-                {"name": name, "geom": int(geom), "radius": float(model.geom_size[geom, 0])}
-                for name, geom in zip(self.point_names, self.foot_contacts.geoms, strict=True)
-            ],
-        }
 
     def _apply_push(self, push: Push, force: Array) -> None:
         """Apply a force at the origin of a push's frame.

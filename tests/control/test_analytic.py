@@ -1,6 +1,7 @@
-"""The analytic controller (§3.1): the robot stands, the answer is optimal, and fails as in §4."""
+"""The analytic controller (§3.1): the robot stands, and the answer is optimal.
 
-from __future__ import annotations
+Lesson 05 has the push under which it falls.
+"""
 
 from functools import cache
 
@@ -225,45 +226,3 @@ def test_the_torques_do_not_depend_on_the_way_the_robot_faces():
         there = turned(state, yaw)
         tau = facing(there.q, there.v).tau
         assert np.allclose(tau, expected, atol=1e-6 * np.abs(expected).max())
-
-
-# the failure that §4 is for -----------------------------------------------------------------------
-
-
-@cache
-def pushed(controller: str, weights: float) -> fb.Rollout:
-    """Push go2 sideways for 0.1 s with a fraction of its weight, under either controller."""
-    robot = judges.load("go2")
-    state, contacts = robot.standing(), fb.Contacts.points(robot)
-    program = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    chosen = controller_of("go2") if controller == "analytic" else program
-    push = fb.Push(np.array([0.0, weights * robot.weight, 0.0]), start=0.1, duration=0.1)
-    return fb.rollout(fb.Simulation(robot), chosen, 1.0, pushes=[push], control_period=PERIOD)
-
-
-def test_the_analytic_controller_withstands_a_light_push():
-    run = pushed("analytic", 0.2)
-    assert run.outcome == "completed"
-    assert np.min(run.planned[:, 2::3]) > 1.0
-    assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3
-
-
-def test_pushed_with_half_its_weight_it_asks_the_ground_to_pull_and_falls():
-    """The controller plans a pull of more than 1 N at a foot; the ground never pulls.
-
-    Within half a second the robot is down.
-    """
-    run = pushed("analytic", 0.5)
-    asks = np.flatnonzero(run.planned[:, 2::3].min(axis=1) < -1.0)
-    assert run.outcome == "fell" and run.time[-1] < 0.6
-    assert len(asks) > 0
-    assert 0.1 < run.time[asks[0]] < 0.2  # while the push still acts, before the fall
-    assert run.measured[:, 2::3].min() >= 0.0
-
-
-def test_the_quadratic_program_keeps_every_force_pushing_and_stands_through_the_same_push():
-    run, robot = pushed("qp", 0.5), judges.load("go2")
-    assert run.outcome == "completed"
-    assert np.min(run.planned[:, 2::3]) > -1e-6
-    assert np.max(np.abs(run.tau_desired) - robot.torque_limits) < 1e-6
-    assert np.linalg.norm(run.com[-1] - run.com[0]) < 1e-3

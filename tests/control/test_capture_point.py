@@ -1,7 +1,5 @@
 """The capture-point inequality in physics; test_independent_qps has its rows."""
 
-from __future__ import annotations
-
 import judges
 import numpy as np
 from messages import refused

@@ -1,7 +1,5 @@
 """The compiled tick: when it runs, what it compiles and keeps on disk, and its memory."""
 
-from __future__ import annotations
-
 import fcntl
 import inspect
 import multiprocessing

@@ -1,7 +1,5 @@
 """The compiled backend against the reference backend: same torques, verdicts and messages."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +12,7 @@ from messages import missing, raises
 import floatbase as fb
 from floatbase.control import LinearInequality, capture_point_inequality
 from floatbase.control.tick import CompiledTick
-from floatbase.dynamics import (
-    CONSTRAINT_RANK_TOLERANCE,
-    RollingWheel,
-    fixed_frame,
-    moving_frame,
-)
+from floatbase.dynamics import CONSTRAINT_RANK_TOLERANCE, RollingWheel, fixed_frame, moving_frame
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
 from floatbase.objectives import (

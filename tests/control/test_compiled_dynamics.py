@@ -1,7 +1,5 @@
 """The dynamics inside the compiled tick against Pinocchio's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges

@@ -1,7 +1,5 @@
 """A sample of the problems of benchmarks/constraints.py, against its independent QPs."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Joint limits: viable bounds on q̈, both backends, an independent QP, and stops in MuJoCo."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges

@@ -3,8 +3,6 @@
 They are respected, named when they conflict, and refused if they do not fit.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import judges
@@ -14,7 +12,7 @@ from messages import raises
 
 import floatbase as fb
 from floatbase.control import LinearInequality
-from floatbase.dynamics import PointContact
+from floatbase.dynamics import EquationsOfMotion, PointContact
 from floatbase.errors import InfeasibleError, InputError, UnknownNameError
 from floatbase.robots import Robot
 
@@ -32,7 +30,7 @@ def user_inequalities(robot: Robot, contacts: fb.Contacts) -> list[LinearInequal
     sides = [f"{joint} {side}" for side in ("upper", "lower") for joint in robot.joint_names]
     accelerations = (np.vstack([E, -E]), np.full(2 * robot.d, 30.0))
 
-    def joined(eom: fb.EquationsOfMotion, t: float) -> tuple[np.ndarray, np.ndarray]:
+    def joined(eom: EquationsOfMotion, t: float) -> tuple[np.ndarray, np.ndarray]:
         return np.vstack([turns, -turns]), np.full(2, (0.01 - 0.002 * t) * robot.weight)
 
     return [

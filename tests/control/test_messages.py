@@ -1,7 +1,5 @@
 """Errors of tasks, limits and controllers: their types, and the names and numbers in them."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from dataclasses import replace
@@ -57,7 +55,6 @@ def analytic(**swap: object) -> AnalyticController:
     "case",
     [
         (lambda: controller(facets=2), "facets", 2, 3),
-        (lambda: controller(facet_rotation=np.nan), "facet_rotation", np.nan),
         (lambda: controller(min_normal_force=-1.0), "min_normal_force", -1),
         (lambda: controller(min_normal_force={"FL_foot": lambda t: -1.0}), "min_normal_force",
             "FL_foot", -1),
@@ -71,7 +68,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: Limits(np.ones(12), min_normal_force=-50.0), "min_normal_force", -50),
         (lambda: controller(torque_limits=[1.0, 2.0]), "torque_limits", 12, 2),
         (lambda: controller(torque_limits=0.0), "torque_limits", 12, 0),
-        (lambda: controller(torque_limits="strong"), "torque_limits", "strong"),
         (lambda: controller(inequalities=rows("tau", 12)), "inequalities", "LinearInequality"),
         (lambda: controller(inequalities=[np.eye(12)]), "inequalities", "LinearInequality", 12),
         (lambda: controller(inequalities=[rows("tau", 3)]), "r", "tau", 3, 12),
@@ -87,7 +83,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: LinearInequality("r", "tau", lambda eom: 3.0), "r", "eom", "t"),
         (lambda: controller(Own(without="block")), "Own", "block"),
         (lambda: controller(constant(np.ones(3))), "residual", "mine", "ndarray"),
-        (lambda: controller(constant(None)), "residual", "mine", "NoneType"),
         (lambda: controller(own(lambda eom: None)), "residual", "mine", "eom", "t"),
         (lambda: controller(own(lambda eom, t: fb.Affine(np.ones(18), [0.0]))), "mine", "A", 18),
         (lambda: controller(own(lambda eom, t: fb.Affine(np.eye(18), NAN))), "mine", "b", np.nan),
@@ -97,18 +92,12 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(fb.CoMTask), "tasks", "CoMTask"),
         (lambda: controller(SimpleNamespace(**vars(Own()) | {"residual": np.eye(3)})), "tasks",
             "SimpleNamespace"),
-        (lambda: controller("stand"), "tasks", "stand"),
-        (lambda: controller().replace(tasks=3), "tasks", 3),
         (lambda: controller().replace(tasks=[Own()]), "residual", "mine", "qdd", 3, 18),
         (lambda: controller(modify_qp=lambda qp: qp), "modify_qp", "eom"),
         (lambda: controller(modify_qp=lambda qp, eom: None), "modify_qp", "QP"),
         (lambda: controller(modify_qp=lambda qp, eom: replace(qp, blocks={})), "modify_qp",
             "blocks"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), "tasks", "CoMTask"),
-        (lambda: fb.WholeBodyController(GO2, CONTACTS, None), "tasks", "None"),
-        (lambda: fb.WholeBodyController(GO2, [1], []), "contacts", "Contacts", 1),
-        (lambda: fb.WholeBodyController("go2", CONTACTS, []), "robot", "Robot", "go2"),
-        (lambda: fb.standing_tasks(GO2), "state", "State"),
         (lambda: controller().qp(SOLO.standing()), "solo12", "go2"),
         (lambda: controller(fb.PostureTask(np.zeros(5))), "q", 5, 19),
         (lambda: controller(fb.ForceTask(np.zeros(3))), "target", 3, 12),
@@ -120,7 +109,6 @@ def analytic(**swap: object) -> AnalyticController:
             "acceleration"),
         (lambda: controller(fb.CoMTask(lambda t: None)), "position", 3, "None"),
         (lambda: controller(fb.CoMTask(lambda t: (UP, None, UP))), "velocity", 3, "None"),
-        (lambda: controller(fb.CoMTask(lambda t: np.array(1.0))), "position", 3),
         (lambda: controller(fb.CoMTask(lambda t: ([0, [0]], UP, UP))), "position", 3),
         (lambda: controller(fb.OrientationTask("base", lambda t: np.zeros((3, 3)))), "rotation",
             "base"),
@@ -130,7 +118,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: fb.CoMTask(UP, kp=-1.0), "kp", -1),
         (lambda: fb.CoMTask(UP, lambda t: UP), "velocity", "position"),
         (lambda: fb.CoMTask(lambda t: UP, UP), "velocity", "position"),
-        (lambda: fb.CoMTask([0.0, 0.0]), "position", 2, 3),
         (lambda: fb.FrameTask("base", UP, kd=-1.0), "kd", "base", -1),
         (lambda: fb.PostureTask(STATE.q[None]), "q", 1, 19),
         (lambda: fb.PostureTask(STATE.q, weight=-1.0), "weight", -1),
@@ -139,8 +126,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: fb.OrientationTask("base", np.eye(2)), "rotation", "base", 2, 3),
         (lambda: fb.OrientationTask("base", 2 * np.eye(3)), "rotation", "base"),
         (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), "rotation", "base"),
-        (lambda: controller()(np.zeros(3), STATE.v), "q", 3, 19),
-        (lambda: controller()(STATE.q, np.full(18, np.nan)), "v", np.nan),
         (lambda: controller()(1.1 * STATE.q, STATE.v), "q", 1.1),
         (lambda: analytic(com=[0.0, 0.0]), "com", 2, 3),
         (lambda: analytic(kp=-1.0), "kp", -1),
@@ -148,8 +133,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: analytic(alpha=-0.1), "alpha", -0.1),
         (lambda: analytic(bias_weight=0.0), "bias_weight", 0),
         (lambda: analytic(posture_weight=0.0), "posture_weight", 0),
-        (lambda: analytic(torque_weight=np.nan), "torque_weight", np.nan),
-        (lambda: analytic(a=np.nan), "a", np.nan),
         (lambda: analytic(state=SOLO.standing()), "state", "go2"),
     ],
 )  # fmt: skip
@@ -175,10 +158,6 @@ def test_bad_input_is_refused_by_name(case):
 def test_an_unknown_name_is_refused_with_similar_names(case):
     call, *wanted = case
     refused(call, UnknownNameError, *wanted)
-
-
-def test_an_error_in_a_user_defined_task_reaches_the_user():
-    refused(lambda: controller(own(lambda eom, t: 1 + "")), TypeError)
 
 
 def test_the_error_of_a_trajectory_that_begins_later_mentions_time_zero():

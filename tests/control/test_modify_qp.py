@@ -1,7 +1,5 @@
 """`modify_qp`: a function that changes the QP of each control step before it is solved."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 
@@ -12,13 +10,14 @@ import pytest
 import floatbase as fb
 from floatbase import _blas
 from floatbase.behaviours import Gait, Walk
+from floatbase.dynamics import EquationsOfMotion
 from floatbase.qp import QP
 
 GO2 = judges.load("go2")
 PARTS = ("H", "g", "A", "b", "G", "h")
 
 
-def with_even_knees(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+def with_even_knees(qp: QP, eom: EquationsOfMotion) -> QP:
     """Add a row that couples torques: both front knees have the same torque."""
     first, second = (eom.robot.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR"))
     row = np.zeros((1, qp.n))
@@ -27,7 +26,7 @@ def with_even_knees(qp: QP, eom: fb.EquationsOfMotion) -> QP:
     return replace(qp, A=A, b=b, equality_names=names)
 
 
-def unchanged(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+def unchanged(qp: QP, eom: EquationsOfMotion) -> QP:
     return qp
 
 
@@ -63,7 +62,7 @@ def test_modify_qp_uses_the_reference_backend_and_the_reason_names_modify_qp():
 def test_a_walk_hands_it_to_the_controllers_of_all_stances():
     seen = set()
 
-    def watch(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+    def watch(qp: QP, eom: EquationsOfMotion) -> QP:
         seen.add(eom.contacts.names)
         return qp
 
@@ -76,7 +75,7 @@ def test_a_walk_hands_it_to_the_controllers_of_all_stances():
 def test_a_reference_step_uses_one_blas_thread_and_leaves_the_number_as_it_was():
     threads, inside = getattr(_blas.LIBRARY, _blas.SETTER.replace("set", "get")), []
 
-    def read(qp: QP, eom: fb.EquationsOfMotion) -> QP:
+    def read(qp: QP, eom: EquationsOfMotion) -> QP:
         inside.append(threads())
         if len(inside) > 2:
             raise ValueError

@@ -1,7 +1,5 @@
 """Strict priorities: no level of random problems can be improved, and what levels may contain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Targets as an array, and attempts that say no without reasons."""
 
-from __future__ import annotations
-
 import time
 
 import judges
@@ -33,9 +31,9 @@ def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend):
     controller, rng = moving_controller(backend), np.random.default_rng(0)
     for state in judges.states("go2", 5, 0.05):
         t = float(rng.uniform(0.0, 0.1))
-        expected = controller(state.q, state.v, t)
+        unchanged = controller(state.q, state.v, t)
         command = controller(state.q, state.v, 7.0, controller.targets_at(t))
-        assert command.backend == backend and np.array_equal(command.tau, expected.tau)
+        assert command.backend == backend and np.array_equal(command.tau, unchanged.tau)
         targets = controller.targets_at(0.0)
         com = targets[controller.targets["centre of mass"]]
         com[:3] += rng.normal(0.0, 0.02, 3)
@@ -46,21 +44,7 @@ def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend):
         assert np.allclose(command.tau, expected.tau, rtol=0.0, atol=1e-9)
         assert np.allclose(command.solution.x, expected.solution.x, rtol=0.0, atol=1e-9)
         assert max(vars(command.solution.residuals).values()) < 1e-6
-
-
-def test_both_backends_agree_on_targets_and_targets_do_not_change_a_controller():
-    compiled, reference = moving_controller("compiled"), moving_controller("reference")
-    rng = np.random.default_rng(0)
-    assert dict(compiled.targets) == dict(reference.targets)
-    for state in judges.states("go2", 5, 0.05):
-        targets = compiled.targets_at(0.0)
-        noise = rng.normal(0.0, 0.02, targets.size)
-        noise[compiled.targets["orientation of base"]] = 0.0
-        noise[compiled.targets["posture"]][:7] = 0.0
-        before = compiled(state.q, state.v).tau
-        taus = [each(state.q, state.v, 0.0, targets + noise).tau for each in (compiled, reference)]
-        assert judges.relative(*taus) < 1e-6
-        assert np.array_equal(compiled(state.q, state.v).tau, before)
+        assert np.array_equal(controller(state.q, state.v, t).tau, unchanged.tau)
 
 
 @pytest.mark.parametrize("backend", ["compiled", "reference"])

@@ -1,7 +1,5 @@
 """User-defined tasks and constraints: the same answers on both backends, and their errors."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

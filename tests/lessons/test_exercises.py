@@ -3,7 +3,6 @@
 import json
 import multiprocessing
 import os
-import re
 import threading
 from collections import Counter
 from pathlib import Path
@@ -89,17 +88,6 @@ def test_a_solution_is_shown_after_two_tries_and_placeholders_use_up_none(capsys
     assert "02.1 ✗" in capsys.readouterr().out
     reveal("02.1")
     assert solution in capsys.readouterr().out
-
-
-def test_progress_is_kept_and_shown(capsys):
-    check("00.1", None)
-    assert progress.load() == {}
-    marks = []
-    for answer in (None, 3.0, LIFTED):
-        check("00.1", answer)
-        show_progress()
-        marks += re.findall("00.1 (.)", capsys.readouterr().out)
-    assert marks == ["·", "✗", "✓"]
 
 
 @pytest.mark.parametrize("home", ["FLOATBASE_HOME", "HOME"])

@@ -103,13 +103,3 @@ def test_lessons_link_to_colab_only_if_the_address_of_the_repository_is_known(co
         assert lesson_table().count("colab.research") == (16 if expected else 0)
     project.unlink()
     assert hosted.colab_address(course) == ""
-
-
-def test_progress_is_kept_where_the_learner_says(monkeypatch, tmp_path):
-    """On Colab, this is a folder of a mounted drive, which may not exist yet."""
-    from floatbase.lessons import check, progress
-
-    monkeypatch.setenv("FLOATBASE_HOME", str(tmp_path / "drive" / "floatbase"))
-    check("00.1", 1.0)
-    (file,) = (tmp_path / "drive" / "floatbase").iterdir()
-    assert progress.path() == file and "00.1" in progress.load()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import tornado.websocket
 from IPython.core.formatters import DisplayFormatter
+from panels import RANGES
 from waiting import until
 
 import floatbase as fb
@@ -18,13 +19,6 @@ from floatbase.lessons import lessonC, live_run, push_panel, slider_panel
 from floatbase.lessons.slider_samples import panel_samples
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
-RANGES = [
-    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0.0, 1.5, 4.0, 0.05),
-    (0, 60, 80, 1.0),
-    (0.0, 0.5, 1.0, 0.02), (0.0, 60.0, 120.0, 2.0), (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1),
-    (0, 0.003, 0.01, 0.0002),
-    (0, 250, 5000, 50.0), (-180.0, 0.0, 180.0, 5.0),
-]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

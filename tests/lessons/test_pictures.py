@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browsers import SCREENSHOTS, browser_of_a_file, needs_chromium, served
+from panels import RANGES
 
 import floatbase as fb
 from floatbase.lessons import ConstantTorques, live_run, push_panel, slider_panel, static_export
@@ -22,12 +23,6 @@ from floatbase.viewer.web import pages
 
 Pictures = pictures.Pictures
 STATIC = Path(pictures.__file__).with_name("site") / "static"
-RANGES = [
-    (-6.0, 2.0, 6.0, 0.2), (-40.0, 30.0, 40.0, 1.0), (-1.5, -0.7, 1.5, 0.05), (0, 60, 80, 1.0),
-    (0, 22, 25, 0.5),
-    (-8, 0.5, 8, 0.1), (-5, -5, 0, 0.1), (0, 0.003, 0.01, 0.0002), (3, 4, 53, 1.0), (1, 3, 24, 0.2),
-    (0, 0, 5, 0.1),
-]  # fmt: skip
 ANIMATION = "set_animation"
 GIVEN = {
     "samples": {"down": (0, 0.05, 0.1), "force": (0, 30, 60)},

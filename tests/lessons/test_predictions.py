@@ -217,23 +217,6 @@ def test_what_was_said_to_another_question_of_that_name_does_no_harm(said, befor
     assert said()[0].startswith("02.c: 69 mm")
 
 
-def test_what_cannot_be_kept_lives_with_the_process_and_a_line_says_why(learner, monkeypatch, said):
-    (learner / "file").write_text("")
-    monkeypatch.setenv("FLOATBASE_HOME", str(learner / "file"))
-    predict("05.u", 40, unit="mm")
-    assert str(learner / "file") in said()[1]
-    compare("05.u", 69.2)
-    review("05")
-    assert "69 mm" in (line := said()[0]) and "40 mm" in line
-    assert not progress.path().exists()
-
-    monkeypatch.setenv("FLOATBASE_HOME", str(learner))  # as soon as it can be kept, it is
-    predict("05.v", 3, unit="mm")
-    first, *_ = (learner / "progress.jsonl").read_text().split()
-    assert "05.u" in first and len(lines(learner)) == 3
-    assert progress.predictions()["05.u"] == {"said": 40, "unit": "mm", "is": 69.2}
-
-
 def test_a_name_that_was_left_out_is_missed():
     for call in (lambda: predict(3.0, unit="N"), lambda: compare(3.0, 2.0), lambda: review(2)):
         with pytest.raises(InputError, match="string"):

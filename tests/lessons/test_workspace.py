@@ -75,13 +75,6 @@ def test_a_copy_keeps_predictions_and_folded_claims(course):
     assert source(course / MY_FOLDER / LESSON) == copied[0].source
 
 
-def test_a_lesson_is_copied_once_and_then_left_alone(course):
-    assert prepare_workspace(course) == [f"{LESSON}: new"]
-    write(course / MY_FOLDER / LESSON, "first = 'my answer'")
-    assert prepare_workspace(course) == []
-    assert source(course / MY_FOLDER / LESSON) == "first = 'my answer'"
-
-
 def test_learners_of_one_installed_course_have_separate_copies(course, tmp_path):
     folders = [tmp_path / "homes" / name / "course" for name in ("ada", "bob")]
     for folder in folders:

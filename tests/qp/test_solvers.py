@@ -147,38 +147,6 @@ def test_rows_that_miss_each_other_by_a_little_are_named_as_well(solver, gap):
     assert caught.value.constraints == ("inequality 0", "inequality 1")
 
 
-@pytest.mark.parametrize("name", judges.KINDS[:3])
-def test_an_infeasible_controller_names_a_minimal_set_of_rows(name):
-    """Weak motors, slippery ground, feet that must press: feasible or not as a linear program says,
-    never anything else.
-    """
-    robot, rng = judges.load(name), np.random.default_rng(5)
-    verdicts = []
-    for seed in range(8):
-        limits = 10.0 ** rng.uniform(-2.0, -0.5) * robot.torque_limits
-        contacts = judges.stance(robot, rng.choice([0.2, 0.7]))
-        tasks = fb.standing_tasks(robot.standing())
-        press = rng.choice([0.0, 2.0]) * robot.weight / contacts.n_points
-        options = {"torque_limits": limits, "min_normal_force": press, "backend": "reference"}
-        controller = fb.WholeBodyController(robot, contacts, tasks, **options)
-        qp = controller.qp(robot.random_state(seed, 0.3), slacks=False)
-        try:
-            solve(qp)
-        except InfeasibleError as error:
-            assert judges.is_smallest_conflict(qp, error.constraints), seed
-            verdicts.append(False)
-        else:
-            assert judges.is_feasible(qp, list(range(len(qp.G)))), seed
-            verdicts.append(True)
-    assert not all(verdicts)
-
-
-@pytest.mark.parametrize("solver", solvers())
-def test_rows_that_only_just_meet_leave_a_point(solver):
-    found = solve(QP(np.eye(2), [1.0, 2.0], *NONE, [[1.0, 0.0], [-1.0, 0.0]], [1.0, -1.0]), solver)
-    assert np.allclose(found.x, [1.0, -2.0], atol=1e-6)
-
-
 @pytest.mark.parametrize("solver", EXACT)
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6, 1e10])
 def test_rows_through_one_point_leave_it_whatever_its_unit(solver, scale):

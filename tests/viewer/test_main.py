@@ -13,9 +13,10 @@ from messages import missing
 from numpy.testing import assert_allclose
 from waiting import PATIENCE, until
 
-from floatbase.__main__ import main, start_when_connected
+from floatbase.__main__ import main
 from floatbase.errors import InputError
 from floatbase.playground import Playground, RealTimeFactor
+from floatbase.playground._view_command import start_when_connected
 from floatbase.robots import catalogue, load
 
 from .looks import control, eventually, picture
@@ -54,7 +55,7 @@ def test_a_robot_is_described_by_the_arguments(tmp_path, monkeypatch):
         shown.append(robot)
         raise InputError("shown")
 
-    monkeypatch.setattr("floatbase.playground.Playground", show)
+    monkeypatch.setattr("floatbase.playground._view_command.Playground", show)
     folders = ["--package-dirs", *map(str, g1.package_dirs)]
     for options in ([], ["--feet", "left_ankle_roll_link", "right_ankle_roll_link"]):
         posture = ["--posture", "*_knee_joint=0.7", "left_knee_joint=0.6"]

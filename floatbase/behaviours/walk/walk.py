@@ -457,18 +457,6 @@ class Walk:
             The time [s].
         """
 
-    def page_data(self) -> dict[str, Any]:
-        """Return the gait and the settings of plans, as data for the robot in a web page.
-
-        Returns
-        -------
-        dict
-            "gait" and "plan", with values for JSON and the names that the page's JavaScript has.
-        """
-        from floatbase.behaviours.walk.page_data import gait_data, plan_data  # loads numba
-
-        return {"gait": gait_data(self), "plan": plan_data(self)}
-
     def _clear(self) -> None:
         """Make everything that a copy makes anew."""
         self._posture = WalkingPosture(self._all_contacts, self._robot.standing())
