@@ -202,9 +202,9 @@ def _solve_with_known_violations(
     assert qp.penalties is not None
     sign = np.where(violated, -1.0, 1.0)
     penalties = np.where(violated, qp.penalties, 0.0)
-    hard = changed(
-        qp, g=qp.g + qp.G.T @ penalties, G=sign[:, None] * qp.G, h=sign * qp.h, penalties=None
-    )
+    g, G, h = qp.g + qp.G.T @ penalties, sign[:, None] * qp.G, sign * qp.h
+    space = qp.equality_space  # the same, and computing it takes a third of the time of a step
+    hard = changed(qp, g=g, G=G, h=h, penalties=None, equality_space=space)
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
         # without a search for the names of a conflict, which soft rows may resolve
         found = _daqp(hard, budget) if solver == "daqp" else _BACK_ENDS[solver](hard)
@@ -252,10 +252,10 @@ def _daqp(qp: QP, budget: Budget | None = None) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
     If polishing fails for all proximal weights, the solution is DAQP's first result, and its solver
-    is `UNREFINED`. So is that of a problem with soft inequalities, whose violations are slack
-    variables s ≥ 0 before the others: bounds of the first variables are cheap. Return None if DAQP reports infeasibility, since it may mistake small curvature
-    for it. Also return None if weights are so far apart that DAQP does not converge; with a budget,
-    this raises `SolverError`.
+    is `UNREFINED`. With soft inequalities, it always is: the first variables are their violations
+    s ≥ 0, as bounds, which take DAQP less time than rows. Return None if DAQP reports
+    infeasibility, since it may mistake small curvature for it. Also return None if weights are so
+    far apart that DAQP does not converge; with a budget, this raises `SolverError`.
     """
     import daqp
 

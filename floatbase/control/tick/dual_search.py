@@ -34,6 +34,8 @@ INACCURATE, INFEASIBLE = -2, -3
 PIVOT_TOLERANCE = 1e-13
 # fraction of a row, squared, outside the active rows: with less, it depends on them
 DEPENDENCE_TOLERANCE = 1e-12
+# with less, it surely does; between the two, weights are too far apart to tell
+SURE_DEPENDENCE = 1e-20
 NEWTON_STEPS = 3  # at most; one or two are enough unless weights are far apart
 STEP_TOLERANCE = 1e-6  # fraction of β: after a step this small, only rounding remains
 MAX_FINAL_STEP = 1e-4  # fraction of β that the last step may still change
@@ -254,7 +256,7 @@ def enforce(number, row, bound, weight, q, d, z, r, active: ActiveSet, limits: I
         )
         step = min(partial_step, full_step, weight - multiplier)
         if step == np.inf:
-            return INFEASIBLE
+            return INFEASIBLE if curvature <= SURE_DEPENDENCE * size else INACCURATE
         for j in range(q):
             mu[j] -= step * r[j]
         multiplier += step
