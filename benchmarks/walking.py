@@ -350,6 +350,7 @@ def rows(n: int) -> Iterator[Row]:
     yield first_infeasible()
     yield step_time("go2", Gait.trot, 30.0)
     yield step_time("talos", Gait.walk, 90.0)
+    yield step_time("g1", Gait.walk, 20.0)
 
 
 def main() -> None:

@@ -79,7 +79,7 @@ def solve_levels(
     """
     solutions: list[Solution] = []
     A, b, names = qps[0].A, qps[0].b, qps[0].equality_names
-    h, penalties = qps[0].h, qps[0].penalties
+    h, penalties, used = qps[0].h, qps[0].penalties, set(names)
     free, x = qps[0].equality_space
     kept: dict[str, float] = {}
     for qp, tasks, terms in zip(qps, levels, costs, strict=True):
@@ -116,12 +116,15 @@ def solve_levels(
         free = free @ null_space(qp.G[active] @ free / qp.row_norms[active, None], absolute=True)
         A = np.vstack([A, rows, qp.G[active]])
         b = np.concatenate([b, right, qp.G[active] @ x])
+        unused = []
         for label in (*labels, *active_names):
-            names = (*names, _unused(label, names))
+            unused.append(_unused(label, used))
+            used.add(unused[-1])
+        names = (*names, *unused)
     return solutions
 
 
-def _unused(label: ConstraintLabel, used: Sequence[str]) -> ConstraintLabel:
+def _unused(label: ConstraintLabel, used: set[str]) -> ConstraintLabel:
     """Return a label, with a number if its text is in use, as that of a task of the same name."""
     text, n = str(label), 1
     while text in used:

@@ -232,10 +232,8 @@ class WholeBodyController:
             problem = _softened(problem, contact_weight)
         limits.check_names(contacts.names, _foot_frames(robot))
         with dry_run():  # unknown names and wrong shapes raise here, not in the loop
-            if problem.level_sizes:
-                problem.check()  # the QP of a level needs solutions
-            else:
-                problem.qp(robot.standing(), slacks=False)
+            # without levels, since the QP of a level needs solutions
+            replace(problem, level_sizes=()).qp(robot.standing(), slacks=False)
         check_solver(solver)
         _check_choice("backend", backend, Backend)
         _check_choice("on_infeasible", on_infeasible, OnInfeasible)

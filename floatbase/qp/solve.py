@@ -37,10 +37,10 @@ _RANK_TOLERANCE = 1e-12  # of a singular system of optimality conditions, relati
 _ROUNDING = 1e-14  # fraction of the terms of a slope that may be rounding
 _STATIONARITY = 1e-12  # fraction of its largest term that the slope at an optimum may have
 # of the distance from the last point, which DAQP adds to the objective, relative to the largest
-# curvature. The first is for an objective without curvature in some direction; larger ones can take
-# thousands of iterations. The others are for problems in which DAQP cycles with the first or finds
-# other active rows than the optimum has
-_PROXIMAL_WEIGHTS = -1e-6, 1e-5, 1e-4
+# curvature. The negative ones are for an objective without curvature in some direction: with the
+# second, humanoids need two to four times the iterations, but it is nearer to the objective. The
+# others are for problems in which DAQP cycles or finds other active rows than the optimum has
+_PROXIMAL_WEIGHTS = -1e-2, -1e-6, 1e-5, 1e-4
 # DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
 # 4 s on a loaded machine, and it was never seen to need more than 155
 _DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
@@ -127,21 +127,16 @@ def solve_in_step(qp: QP, solver: str, budget: Budget) -> Solution:
     """
     if solver != "daqp":
         return solve(qp, solver)
-    relaxed = qp
     if len(qp.soft):
         exact = _solve_with_known_violations(qp, np.zeros(len(qp.G), dtype=bool), solver, budget)
         if exact is not None:
             return exact
-        relaxed = qp.reduced.with_slacks()  # without equalities, whose elimination takes 1 ms
-    found = _daqp(relaxed, polish=relaxed is qp, budget=budget)
+    found = _daqp(qp, budget)
     if found is None:
         raise InfeasibleError(lambda: _explanation(qp.with_slacks()))
-    if relaxed is qp:
+    if not len(qp.soft):
         return found
-    multipliers = found.inequality_multipliers[: len(qp.G)]
-    x = qp.equality_space(found.x[: qp.reduced.n])
-    rough = Solution(qp, x, multipliers, UNREFINED, found.iterations)
-    return _solve_with_known_violations(qp, _violations(qp, rough), solver, budget) or rough
+    return _solve_with_known_violations(qp, _violations(qp, found), solver, budget) or found
 
 
 def _explanation(qp: QP) -> InfeasibleError:
@@ -175,13 +170,12 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
     exact = _solve_with_known_violations(qp, np.zeros(len(qp.G), dtype=bool), solver)
     if exact is not None:
         return exact
-    relaxed = qp.with_slacks()
-    rough = _daqp(relaxed, polish=False) if solver == "daqp" else None
+    rough = _daqp(qp) if solver == "daqp" else None
     if rough is not None:
         exact = _solve_with_known_violations(qp, _violations(qp, rough), solver)
         if exact is not None:
             return exact
-    found = solve(relaxed, solver)
+    found = solve(qp.with_slacks(), solver)
     exact = _solve_with_known_violations(qp, _violations(qp, found), solver)
     if exact is not None:  # a fallback that found the violations took its time
         return exact if found.solver == solver else replace(exact, solver=found.solver)
@@ -190,7 +184,7 @@ def _solve_soft(qp: QP, solver: str) -> Solution:
 
 
 def _violations(qp: QP, found: Solution) -> npt.NDArray[np.bool_]:
-    """Return which soft inequalities are violated in a solution of the problem with slacks."""
+    """Return which soft inequalities a solution violates, which may be that with slacks."""
     G, h, norms, x = qp.G[qp.soft], qp.h[qp.soft], qp.row_norms[qp.soft], found.x[: qp.n]
     violated = np.zeros(len(qp.G), dtype=bool)
     violated[qp.soft] = (G @ x - h) / norms > violation_tolerance(h / norms, x)
@@ -208,12 +202,12 @@ def _solve_with_known_violations(
     assert qp.penalties is not None
     sign = np.where(violated, -1.0, 1.0)
     penalties = np.where(violated, qp.penalties, 0.0)
-    hard = changed(
-        qp, g=qp.g + qp.G.T @ penalties, G=sign[:, None] * qp.G, h=sign * qp.h, penalties=None
-    )
+    g, G, h = qp.g + qp.G.T @ penalties, sign[:, None] * qp.G, sign * qp.h
+    space = qp.equality_space  # the same, and computing it takes a third of the time of a step
+    hard = changed(qp, g=g, G=G, h=h, penalties=None, equality_space=space)
     with suppress(InfeasibleError, SolverError):  # rows that nearly contradict each other
         # without a search for the names of a conflict, which soft rows may resolve
-        found = _daqp(hard, budget=budget) if solver == "daqp" else _BACK_ENDS[solver](hard)
+        found = _daqp(hard, budget) if solver == "daqp" else _BACK_ENDS[solver](hard)
         if found is None or found.solver == UNREFINED:
             return None
         if np.all(found.inequality_multipliers <= qp.penalties):
@@ -254,50 +248,59 @@ def check_solver(solver: str) -> None:
         require("cvxpy", extra="cvxpy")
 
 
-def _daqp(qp: QP, polish: bool = True, budget: Budget | None = None) -> Solution | None:
+def _daqp(qp: QP, budget: Budget | None = None) -> Solution | None:
     """Eliminate the equalities and solve the rest with DAQP, the solver that controllers use.
 
     If polishing fails for all proximal weights, the solution is DAQP's first result, and its solver
-    is `UNREFINED`. Return None if DAQP reports infeasibility, since it may mistake small curvature
-    for it. Also return None if weights are so far apart that DAQP does not converge; with a budget,
-    this raises `SolverError`.
+    is `UNREFINED`. With soft inequalities, it always is: the first variables are their violations
+    s ≥ 0, as bounds, which take DAQP less time than rows. Return None if DAQP reports
+    infeasibility, since it may mistake small curvature for it. Also return None if weights are so
+    far apart that DAQP does not converge; with a budget, this raises `SolverError`.
     """
     import daqp
 
-    reduced, norms, rows = qp.reduced, qp.row_norms, len(qp.G)
-    if reduced.n == 0:  # the equalities determine x
+    reduced, norms, rows, soft = qp.reduced, qp.row_norms, len(qp.G), qp.soft
+    slacks, n = len(soft), len(soft) + reduced.n
+    if n == 0:  # the equalities determine x
         only = _polished(qp, np.zeros(0), np.zeros(rows))
         return None if only is None else Solution(qp, *only, "daqp")
     scale = _objective_scale(reduced)
+    H, g, G = np.zeros((n, n)), np.zeros(n), np.zeros((rows, n))
+    H[slacks:, slacks:], g[slacks:], G[:, slacks:] = reduced.H, reduced.g, reduced.G
+    if qp.penalties is not None:
+        g[:slacks], G[soft, np.arange(slacks)] = qp.penalties[soft], -1.0
+    upper = np.concatenate([np.full(slacks, 1e30), reduced.h / norms])  # 1e30 is no bound
+    lower = np.concatenate([np.zeros(slacks), np.full(rows, -1e30)])
     first: Solution | None = None
     limit = _DAQP_ITERATIONS
     for proximal_weight in _PROXIMAL_WEIGHTS:  # a negative one: only if curvature is missing
-        if budget is not None and (limit := budget.iterations(reduced.n, rows)) == 0:
+        if budget is not None and (limit := budget.iterations(n, rows)) == 0:
             break
         y, _, exit_flag, info = daqp.solve(
-            reduced.H / scale,
-            reduced.g / scale,
-            reduced.G / norms[:, None],
-            reduced.h / norms,
-            np.full(rows, -1e30),  # DAQP treats this as no bound
-            np.zeros(rows, dtype=np.int32),
+            H / scale,
+            g / scale,
+            G / norms[:, None],
+            upper,
+            lower,
+            np.zeros(slacks + rows, dtype=np.int32),
             primal_tol=FEASIBILITY_TOLERANCE,
             eps_prox=proximal_weight,
             iter_limit=limit,
         )
         count = int(info["iterations"])
         if budget is not None:
-            budget.spend(count, reduced.n, rows)
+            budget.spend(count, n, rows)
         if exit_flag in (-2, -4):  # cycling, too many iterations
             continue
         if exit_flag not in (1, 2):
             break
-        y, mu = np.asarray(y), np.maximum(np.asarray(info["lam"])[:rows] * scale, 0.0) / norms
-        polished = _polished(qp, y, mu) if polish else None
+        y, mu = np.asarray(y)[slacks:], np.asarray(info["lam"])[slacks:]
+        mu = np.maximum(mu * scale, 0.0) / norms
+        polished = None if slacks else _polished(qp, y, mu)
         if polished is not None:
             return Solution(qp, *polished, "daqp", count)
         first = first or Solution(qp, qp.equality_space(y), mu, UNREFINED, count)
-        if not polish:
+        if slacks:
             break
     if first is not None:
         return first
@@ -432,16 +435,18 @@ def _after_newton_steps(qp: QP, y: Array, mu: Array, unique: bool) -> tuple[Arra
     units = np.append(np.full(n, 1.0 / scale), scale / size[active])  # make K comparable with 1
     Z, H, rows = (np.asarray(array, dtype=np.longdouble) for array in (space.A, qp.H, qp.G[active]))
     values = np.concatenate([y, mu[active]]).astype(np.longdouble)
+    if not unique:  # without directions of rounding size, a step is the shortest
+        curvatures, directions = np.linalg.eigh(units[:, None] * K * units)
+        resolved = np.abs(curvatures) > _RANK_TOLERANCE * np.max(np.abs(curvatures), initial=0.0)
+        curvatures, directions = curvatures[resolved], units[:, None] * directions[:, resolved]
     for _ in range(2):
         x = Z @ values[:n] + space.b
         slope = Z.T @ (H @ x + qp.g + rows.T @ values[n:])
         residual = np.concatenate([slope, rows @ x - qp.h[active]]).astype(np.float64)
-        step = (
-            np.linalg.solve(K, residual)
-            if unique
-            else units
-            * np.linalg.lstsq(units[:, None] * K * units, units * residual, _RANK_TOLERANCE)[0]
-        )
+        if unique:
+            step = np.linalg.solve(K, residual)
+        else:
+            step = directions @ (directions.T @ residual / curvatures)
         values -= step
     largest = 1.0 + np.max(np.abs(values[:n]), initial=0.0)
     if not np.max(np.abs(step[:n]), initial=0.0) < _MAX_POLISHING_STEP * largest:

@@ -1,6 +1,7 @@
 """Targets as an array, and attempts that say no without reasons."""
 
 import time
+from contextlib import suppress
 
 import judges
 import numpy as np
@@ -80,6 +81,22 @@ def test_an_attempt_returns_none_where_a_call_raises_an_error(backend):
     assert np.array_equal(strong.attempt(rest.q, rest.v).tau, strong(rest.q, rest.v).tau)
     for bad in (None, np.full(TALOS.nv, np.nan), np.zeros(3)):
         refused(lambda bad=bad: controller.attempt(rest.q, bad), InputError)
+
+
+@pytest.mark.parametrize(("offset", "weight"), [(1.0, 1e7), (100.0, 2e6), (100.0, 1e8)])
+def test_with_weights_far_apart_an_attempt_denies_nothing_that_a_call_finds(offset, weight):
+    """Rounding can make an independent row look like a contradiction of the active ones."""
+    state = GO2.standing()
+    far = fb.FrameTask("FL_foot", state.point("FL_foot") + offset, weight=weight)
+    tasks = [*fb.standing_tasks(state), far]
+    controller = fb.WholeBodyController(GO2, fb.Contacts.feet(GO2, mu=0.6), tasks)
+    found = []
+    for v in np.random.default_rng(0).normal(0.0, 5.0, (10, GO2.nv)):
+        with suppress(InfeasibleError):
+            controller(state.q, v)
+            found.append(controller.attempt(state.q, v))
+    assert found
+    assert None not in found
 
 
 def test_an_attempt_softens_as_a_call_does():
