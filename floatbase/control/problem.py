@@ -15,6 +15,7 @@ from floatbase._blas import one_blas_thread
 from floatbase._validation import (
     Array,
     Value,
+    as_bool,
     as_callable,
     as_instance,
     as_integer,
@@ -184,7 +185,7 @@ class Problem(Value):
             self._check_robot(state)
             eom = equations_of_motion(state, self.contacts, t)
             qp = modified_qp(self, build_qp(eom, self.tasks, self.limits, t, slacks=False), eom)
-        return qp.with_slacks() if slacks else qp
+        return qp.with_slacks() if as_bool("slacks", slacks) else qp
 
     @one_blas_thread()
     def solve_levels(
@@ -329,7 +330,7 @@ def build_qp(
     inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
     normal_forces = limits.hard_normal_forces(eom.contacts, t)
     qp = assemble_qp(eom, costs, limits, normal_forces, inequalities)
-    return qp.with_slacks() if slacks else qp
+    return qp.with_slacks() if as_bool("slacks", slacks) else qp
 
 
 def modified_qp(problem: Problem, qp: QP, eom: EquationsOfMotion) -> QP:
