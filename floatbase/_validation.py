@@ -320,10 +320,10 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
 
 
 def one_or_each(name: str, value: object, n: int, shape: tuple[int, ...]) -> Array:
-    """Return an array of this shape, for all of n states, or one for each state."""
+    """Return an array of this shape for each of n states; they may be equal, and given once."""
     array = numeric_copy(value)
     for_each = array is not None and array.ndim > len(shape)
-    return as_array(name, value, (n, *shape) if for_each else shape)
+    return np.broadcast_to(as_array(name, value, (n, *shape) if for_each else shape), (n, *shape))
 
 
 def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:

@@ -45,9 +45,9 @@ def solve_batch(
         if not may_soften:
             undecided &= codes != tick.infeasible
     for i in np.flatnonzero(undecided):
-        of_row = targets[i] if targets is not None and targets.ndim == 2 else targets
         try:
-            command = controller.attempt(Q[i], V[i], float(times[i]), of_row)
+            given = None if targets is None else targets[i]
+            command = controller.attempt(Q[i], V[i], float(times[i]), given)
         except SolverError:
             status[i] = "failed"
             continue

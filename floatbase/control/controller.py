@@ -34,21 +34,16 @@ from floatbase.control.soft import (
     contact_weight_of,
     with_soft_contacts,
 )
-from floatbase.control.tick import (
-    CompiledTick,
-    TargetLayout,
-    TickInputs,
-    cache_warning,
-    unsupported_reason,
-)
+from floatbase.control.tick import CompiledTick, TargetLayout, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
 from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
 from floatbase.objectives import Task
-from floatbase.qp import QP, Solution, check_solver
+from floatbase.qp import QP, check_solver
 from floatbase.robots import Robot, State
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
+Step: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike, float, Array | None]  # q, v, t and targets
 
 
 class _Settings(NamedTuple):
@@ -57,17 +52,6 @@ class _Settings(NamedTuple):
     solver: str
     backend: Backend
     on_infeasible: OnInfeasible
-
-
-class _Step(NamedTuple):
-    """Arguments of one control step, and how to answer it."""
-
-    q: npt.ArrayLike
-    v: npt.ArrayLike
-    t: float
-    targets: Array | None
-    in_loop: bool  # whether the iterations of the reference backend are limited
-    must_answer: bool  # whether to raise an error instead of returning None
 
 
 class WholeBodyController:
@@ -229,8 +213,8 @@ class WholeBodyController:
         # `Problem` takes levels apart
         problem = Problem(robot, contacts, cast("Sequence[Task]", tasks), limits, modify_qp)
         if contact_weight is not None:
-            problem = _softened(problem, contact_weight)
-        limits.check_names(contacts.names, _foot_frames(robot))
+            problem = with_soft_contacts(problem, contact_weight)
+        limits.check_names(robot, contacts.names)
         with dry_run():  # unknown names and wrong shapes raise here, not in the loop
             # without levels, since the QP of a level needs solutions
             replace(problem, level_sizes=()).qp(robot.standing(), slacks=False)
@@ -291,7 +275,7 @@ class WholeBodyController:
             problem, softened = replace(problem, limits=limits), ("limits",)
             controllers.append(self._with_problem(problem, softened))
         if contact_weight_of(problem.tasks) is None:
-            problem = _softened(problem, SOFT_CONTACT_WEIGHT)
+            problem = with_soft_contacts(problem, SOFT_CONTACT_WEIGHT)
             controllers.append(self._with_problem(problem, (*softened, "contacts")))
         return tuple(controllers)
 
@@ -446,7 +430,7 @@ class WholeBodyController:
             If the reference backend finds neither a solution nor a conflict within its limit.
         """
         in_loop = self._settings.backend != "reference"
-        command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
+        command = self._answer(self._checked_step(q, v, t, targets), True, in_loop)
         assert command is not None
         return command
 
@@ -490,19 +474,22 @@ class WholeBodyController:
         The compiled backend decides in microseconds. States in which its last digits are lost, and
         problems without a compiled form, need the reference backend.
         """
-        return self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), True, False))
+        return self._answer(self._checked_step(q, v, t, targets), False, True)
 
-    def _answer(self, step: _Step) -> Command | None:
-        """Return the command of this controller or of a softer one."""
-        softer = self._softer_controllers
-        if not softer:
-            return self._attempt(step)
-        for controller in (self, *softer[:-1]):
+    def _answer(self, step: Step, must_answer: bool, in_loop: bool) -> Command | None:
+        """Return the command of this controller or of a softer one.
+
+        must_answer: whether to raise an error instead of returning None. in_loop: whether the
+        iterations of the reference backend are limited.
+        """
+        if not self._softer_controllers:
+            return self._attempt(step, must_answer, in_loop)
+        *others, softest = self, *self._softer_controllers
+        for controller in others:
             with suppress(SolverError):  # a softer problem may be easier
-                command = controller._attempt(_Step(*step[:-1], must_answer=False))
-                if command is not None:
+                if (command := controller._attempt(step, False, in_loop)) is not None:
                     return command
-        return softer[-1]._attempt(step)
+        return softest._attempt(step, must_answer, in_loop)
 
     @one_blas_thread()  # also for the checks: several threads take 4 ms for 80,000 numbers
     def batch(
@@ -555,39 +542,38 @@ class WholeBodyController:
         # copies in the form that the compiled loop needs
         Q = np.array(as_array("Q", Q, (None, self.robot.nq)), order="C")
         V = np.array(as_array("V", V, (len(Q), self.robot.nv)), order="C")
-        times = np.broadcast_to(one_or_each("t", t, len(Q), ()), len(Q))
+        times = one_or_each("t", t, len(Q), ())
         if targets is not None:
             targets = one_or_each("targets", targets, len(Q), (self._layout.size,))
-        n_threads = thread_count(threads)
         may_soften = bool(self._softer_controllers)
-        return solve_batch(self, may_soften, Q, V, times, targets, n_threads)
+        return solve_batch(self, may_soften, Q, V, times, targets, thread_count(threads))
 
-    def _checked_inputs(
-        self, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
-    ) -> tuple[float, Array | None]:
-        """Return the time and the targets of a call, checked."""
+    def _checked_step(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, t: float, targets: npt.ArrayLike | None
+    ) -> Step:
+        """Return the arguments of a call, with time and targets checked."""
         if type(t) is not float or not -MAX_MAGNITUDE <= t <= MAX_MAGNITUDE:
             t = as_number("t", t, "s")
         if v is None:  # State takes None for rest; here it is a mistake
             as_array("v", v, (self.robot.nv,))
         if targets is None:
-            return t, None
+            return q, v, t, None
         # the compiled tick checks that numbers are finite
         is_float64 = type(targets) is np.ndarray and targets.dtype.char == "d"
         array = cast(Array, targets) if is_float64 else as_array("targets", targets, (None,))
         self._layout.check_size(array)
-        return t, array
+        return q, v, t, array
 
-    def _attempt(self, step: _Step) -> Command | None:
+    def _attempt(self, step: Step, must_answer: bool, in_loop: bool) -> Command | None:
         """Return the command of this controller alone."""
-        q, v, t, targets, _, must_answer = step
+        q, v, t, targets = step
         tick = self._compiled
         q_array, v_array = numeric_copy(q), numeric_copy(v)
         if tick is None or q_array is None or v_array is None:
-            return self._reference_attempt(step)
+            return self._reference_attempt(step, must_answer, in_loop)
         answer = tick(q_array, v_array, t, targets)
         if answer is None or (must_answer and answer[1] == tick.infeasible):
-            return self._reference_attempt(step)
+            return self._reference_attempt(step, must_answer, in_loop)
         result, n_active, inputs = answer
         if n_active == tick.infeasible:
             return None
@@ -602,19 +588,17 @@ class WholeBodyController:
             problem.contacts,
             "compiled",
             "compiled",
-            partial(self._solution_of, q_array, v_array, t, result, n_active, inputs),
+            partial(tick.solution, q_array, v_array, t, result, n_active, inputs),
             self._softened,
             targets_of_tick,
             tick.layout.names,
             problem.limits.joint_limits,
         )
 
-    def _reference_attempt(self, step: _Step) -> Command | None:
+    def _reference_attempt(self, step: Step, must_answer: bool, in_loop: bool) -> Command | None:
         """Return the reference backend's command."""
-        q, v, t, targets, in_loop, must_answer = step
-        problem, values = self._problem, targets
-        if targets is not None:
-            problem = self._layout.fixed_problem(targets)
+        q, v, t, targets = step
+        problem = self._problem if targets is None else self._layout.fixed_problem(targets)
         state = State(self.robot, q, v)
         try:
             solution = problem.solve_levels(state, t, self.solver, in_loop)[-1]
@@ -622,8 +606,6 @@ class WholeBodyController:
             if must_answer:
                 raise
             return None
-        if values is None:
-            values = self._layout.at(t) if self._layout.varies else self._layout.constant
         return Command(
             tau=read_only(solution["tau"]),
             qdd=read_only(solution["qdd"]),
@@ -633,22 +615,10 @@ class WholeBodyController:
             solver=solution.solver,
             solution=solution,
             softened=self._softened,
-            target_values=read_only(values),
+            target_values=read_only(self._layout.at(t) if targets is None else targets),
             target_entries=self._layout.names,
             joint_limits=self._problem.limits.joint_limits,
         )
-
-    def _solution_of(
-        self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
-    ) -> Solution:
-        """Return the QP of a compiled tick, with the tick's answer as the solution.
-
-        The arguments after t are what `CompiledTick.__call__` returned for q, v and t.
-        """
-        tick = self._compiled
-        assert tick is not None  # it answered
-        x, mu = result[: tick.forces.stop], tick.multipliers(q, result, n_active, inputs)
-        return Solution(tick.qp(q, v, t, inputs), x, mu, "compiled", n_active)
 
     def replace(
         self,
@@ -685,21 +655,16 @@ class WholeBodyController:
             limits=self.limits if limits is None else limits,
         )
         if (weight := contact_weight_of(self._problem.tasks)) is not None:
-            problem = _softened(problem, weight)
+            problem = with_soft_contacts(problem, weight)
         if limits is not None:
             names = *problem.contacts.names, *self.contacts.names
-            limits.check_names(names, _foot_frames(self.robot), before=self.limits)
+            limits.check_names(self.robot, names, before=self.limits)
         other = self._with_problem(problem)
-        if other._compiled is None:
+        compiled, has_changed = other._compiled, tasks is not None or limits is not None
+        if compiled is None:
             problem.check()
-        elif (
-            tasks is not None
-            or limits is not None
-            or self.limits.inequalities
-            or other._compiled.user_terms.any
-        ):
-            # what the problem arrays have not checked
-            problem.check(other._compiled.unchecked_tasks)
+        elif has_changed or self.limits.inequalities or compiled.user_terms.any:
+            problem.check(compiled.unchecked_tasks)  # what the problem arrays have not checked
         return other
 
     def __repr__(self) -> str:
@@ -713,18 +678,3 @@ def _check_choice(name: str, value: object, choices: object) -> None:
     """Raise `UnknownNameError` if a value is none of the choices of a `Literal`."""
     if not isinstance(value, str) or value not in get_args(choices):
         raise unknown_name(name, value, get_args(choices))
-
-
-def _softened(problem: Problem, weight: float) -> Problem:
-    """Return the problem with soft contacts."""
-    contacts, tasks = with_soft_contacts(problem.contacts, problem.tasks, weight)
-    if not problem.level_sizes:
-        return replace(problem, contacts=contacts, tasks=tasks)
-    *others, motion = tasks  # the contacts come first
-    sizes = (problem.level_sizes[0] + len(tasks) - len(problem.tasks), *problem.level_sizes[1:])
-    return replace(problem, contacts=contacts, tasks=(motion, *others), level_sizes=sizes)
-
-
-def _foot_frames(robot: Robot) -> list[str]:
-    """Return the frames of the feet, which are also the names of contacts there."""
-    return [foot.frame for foot in robot.feet]

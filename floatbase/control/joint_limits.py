@@ -318,7 +318,8 @@ class JointLimits(Value):
         """Return positions [rad or m] and velocities [rad/s or m/s] of the joints, (d,) each."""
         robot = as_instance("state", state, State).robot
         self.check_size(robot)
-        return joint_positions(robot, state.q), state.v[robot.nv - robot.d :]
+        index = _position_indices(robot)  # 0 for joints that turn without limits
+        return np.where(index >= 0, state.q[index], 0.0), state.v[robot.nv - robot.d :]
 
     def _upper_bounds(self, gap: Array, v: Array) -> tuple[Array, npt.NDArray[np.intp]]:
         """Return the largest accelerations towards limits, (2, d), and the index of their kind.
@@ -378,12 +379,6 @@ def _labels(robot: Robot, limits: JointLimits) -> npt.NDArray[np.object_]:
         for kind in _KINDS
     ]
     return np.array(labels, dtype=np.object_).reshape(-1, len(_KINDS))
-
-
-def joint_positions(robot: Robot, q: Array) -> Array:
-    """Return the positions of the actuated joints, with 0 for joints that turn without limits."""
-    index = _position_indices(robot)
-    return np.where(index >= 0, q[index], 0.0)
 
 
 @lru_cache(maxsize=64)

@@ -25,6 +25,7 @@ from floatbase._validation import (
     as_strings,
     cached_property,
     checked,
+    frozen,
     numeric_copy,
     read_only,
     short_repr,
@@ -41,6 +42,7 @@ from floatbase.robots._checks import as_torque_limits
 # sizes of the blocks of x: attributes of the equations of motion (7)
 SIZES = {"qdd": "nv", "tau": "d", "forces": "k"}
 BLOCKS = tuple(SIZES)
+_BOUNDS = "min_normal_force", "max_normal_force"
 NormalForces: TypeAlias = float | Mapping[str, float | Callable[[float], float]]
 Coefficients: TypeAlias = tuple[npt.ArrayLike, npt.ArrayLike]
 
@@ -368,16 +370,20 @@ class Limits(Value):
     @property
     def _bounds_by_name(self) -> dict[str, Mapping[str, Any]]:
         """Bounds of normal forces that are mappings, by the name of the argument."""
-        both = {name: getattr(self, name) for name in ("min_normal_force", "max_normal_force")}
+        both = {name: getattr(self, name) for name in _BOUNDS}
         return {name: bound for name, bound in both.items() if isinstance(bound, Mapping)}
 
-    def check_names(self, *known: Iterable[str], before: Limits | None = None) -> None:
+    def check_names(
+        self, robot: Robot, contacts: Iterable[str], before: Limits | None = None
+    ) -> None:
         """Check that bounds of normal forces name known contacts only.
 
         Parameters
         ----------
-        *known : iterable of str
-            Known names.
+        robot : Robot
+            The robot. The frames of its feet are known, since they are the names of contacts there.
+        contacts : iterable of str
+            Other known names.
         before : Limits, optional
             Earlier limits, whose names count as known.
 
@@ -386,7 +392,8 @@ class Limits(Value):
         UnknownNameError
             If a name is neither known nor in the limits before.
         """
-        names = set().union(*known, *(before._bounds_by_name.values() if before else ()))
+        names = {*contacts, *(foot.frame for foot in robot.feet)}
+        names = names.union(*(before._bounds_by_name.values() if before else ()))
         for argument, bound in self._bounds_by_name.items():
             for name in bound:
                 if name not in names:
@@ -415,8 +422,8 @@ class Limits(Value):
             If a function returns a value that is not a number ≥ 0.
         """
         if not self.time_varying:
-            return _constant_normal_forces(contacts, self)
-        return self._normal_forces_at(contacts, t)
+            return _constant_normal_forces(contacts, self, 0.0)
+        return _normal_forces_at(contacts, self, t)
 
     def hard_normal_forces(self, contacts: Contacts, t: float = 0.0) -> tuple[Array, Array]:
         """Return the bounds that normal forces must satisfy: 0 and inf if the bounds are soft.
@@ -459,13 +466,6 @@ class Limits(Value):
         bounds = _soft_force_bounds(contacts, self) if is_soft else None
         return (*self.inequalities, *([bounds] if bounds else []))
 
-    def _normal_forces_at(self, contacts: Contacts, t: float) -> tuple[Array, Array]:
-        """Return minimum and maximum normal force of each contact point at time t."""
-        assert self.max_normal_force is not None  # __post_init__ replaces None
-        least = _bounds_at("min_normal_force", self.min_normal_force, contacts, t, 0.0)
-        largest = _bounds_at("max_normal_force", self.max_normal_force, contacts, t, np.inf)
-        return least, largest
-
     def bounded_points(self, contacts: Contacts) -> npt.NDArray[np.bool_]:
         """Return which contact points have bounds of their normal force, hard or soft.
 
@@ -480,42 +480,33 @@ class Limits(Value):
             True for points with a minimum that is not always 0, and for points with a maximum.
         """
         least, largest = self.min_normal_force, self.max_normal_force
-        assert largest is not None  # __post_init__ replaces None
-        bounded = [
-            (
-                _bound_of(least, foot.name, 0.0) != 0.0,
-                _bound_of(largest, foot.name, None) is not None,
-            )
-            for foot in contacts.friction_contacts
-            for _ in foot.point_names
-        ]
+        bounded = list[tuple[bool, bool]]()
+        for foot in contacts.friction_contacts:
+            has_minimum = _bound_of(least, foot.name, 0.0) != 0.0
+            has_maximum = _bound_of(largest, foot.name, None) is not None
+            bounded += [(has_minimum, has_maximum)] * len(foot.point_names)
         return np.array(bounded, dtype=np.bool_).reshape(-1, 2).T
 
 
-def _bound_of(given: NormalForces, name: str, otherwise: Any) -> Any:
+def _bound_of(given: NormalForces | None, name: str, otherwise: Any) -> Any:
     """Return the bound of the normal forces of a contact: a number, a function or `otherwise`."""
     return given.get(name, otherwise) if isinstance(given, Mapping) else given
 
 
-def _bounds_at(
-    name: str, given: NormalForces, contacts: Contacts, t: float, otherwise: float
-) -> Array:
-    """Return bounds of normal forces at time t, (P,)."""
-    found = []
-    for each in contacts.friction_contacts:
-        value = _bound_of(given, each.name, otherwise)
-        if callable(value):
-            value = as_positive(f"{name} at {each.name}", value(t), "N", allow_zero=True)
-        found += [value] * len(each.point_names)
-    return np.array(found, dtype=np.float64)
+def _normal_forces_at(contacts: Contacts, limits: Limits, t: float) -> tuple[Array, Array]:
+    """Return minimum and maximum normal force of each contact point at time t, (P,)."""
+    found: tuple[list[float], list[float]] = [], []
+    for name, otherwise, bounds in zip(_BOUNDS, (0.0, np.inf), found, strict=True):
+        for each in contacts.friction_contacts:
+            value = _bound_of(getattr(limits, name), each.name, otherwise)
+            if callable(value):
+                value = as_positive(f"{name} at {each.name}", value(t), "N", allow_zero=True)
+            bounds += [value] * len(each.point_names)
+    return frozen(np.array(found[0], np.float64)), frozen(np.array(found[1], np.float64))
 
 
 # what does not depend on the state is cached; contacts, robots and limits are immutable
-@lru_cache(maxsize=64)
-def _constant_normal_forces(contacts: Contacts, limits: Limits) -> tuple[Array, Array]:
-    """Return bounds that do not depend on time, cached."""
-    least, largest = limits._normal_forces_at(contacts, 0.0)
-    return read_only(least), read_only(largest)
+_constant_normal_forces = lru_cache(maxsize=64)(_normal_forces_at)
 
 
 @lru_cache(maxsize=64)
@@ -530,20 +521,16 @@ def _soft_force_bounds(contacts: Contacts, limits: Limits) -> LinearInequality |
         G[i, at] = contacts.normals[i]
     rows = read_only(np.vstack([-G[has_minimum], G[has_maximum]]))
 
-    def bounds_at(t: float) -> Array:
-        """Return the bounds at time t."""
-        least, largest = limits.normal_forces(contacts, t)
-        return np.concatenate([-least[has_minimum], largest[has_maximum]])
-
-    def coefficients(eom: EquationsOfMotion, t: float) -> Coefficients:
+    def coefficients(eom: EquationsOfMotion | None, t: float) -> Coefficients:
         """Return the rows and the bounds at time t."""
-        return rows, bounds_at(t)
+        least, largest = limits.normal_forces(contacts, t)
+        return rows, np.concatenate([-least[has_minimum], largest[has_maximum]])
 
     points = np.array(contacts.point_names)
     names = [f"smallest {point}" for point in points[has_minimum]]
     names += [f"largest {point}" for point in points[has_maximum]]
     weight = limits.normal_force_weight
-    given = coefficients if limits.time_varying else (rows, bounds_at(0.0))
+    given = coefficients if limits.time_varying else coefficients(None, 0.0)
     return LinearInequality("soft normal force", "forces", given, names, weight)
 
 

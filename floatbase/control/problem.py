@@ -36,13 +36,7 @@ from floatbase.dynamics import (
     resolved_constraint,
 )
 from floatbase.errors import FloatbaseError, InfeasibleError, InputError
-from floatbase.objectives import (
-    CentreOfPressureTask,
-    ForceTask,
-    Task,
-    TorqueTask,
-    effort_weight,
-)
+from floatbase.objectives import CentreOfPressureTask, ForceTask, Task, TorqueTask, effort_weight
 from floatbase.qp import QP, ConstraintLabel, Solution, solve
 from floatbase.qp._changed import changed
 from floatbase.qp.solve import Budget, solve_in_step
@@ -224,10 +218,7 @@ class Problem(Value):
         self._check_robot(state)
         eom = equations_of_motion(state, self.contacts, t)
         levels = self.levels
-        costs = [
-            [(task.block, task.weight, residual_of(task, eom, t)) for task in level]
-            for level in levels
-        ]
+        costs = [_costs(level, eom, t) for level in levels]
         inequalities = [each.at(eom, t) for each in self.limits.all_inequalities(self.contacts)]
         bounds = self.limits.hard_normal_forces(self.contacts, t)
         first = assemble_qp(eom, costs[0], self.limits, bounds, inequalities)
@@ -326,7 +317,7 @@ def build_qp(
             f"tasks must be a list of tasks, such as [fb.CoMTask(state.com)], not "
             f"{short_repr(tasks)}."
         )
-    costs = [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
+    costs = _costs(tasks, eom, t)
     inequalities = [each.at(eom, t) for each in limits.all_inequalities(eom.contacts)]
     normal_forces = limits.hard_normal_forces(eom.contacts, t)
     qp = assemble_qp(eom, costs, limits, normal_forces, inequalities)
@@ -398,6 +389,11 @@ def assemble_qp(
     for array in (H, g, A, b, G, h):
         frozen(array)  # `QP` copies others
     return QP(H, g, A, b, G, h, equality_names, names, blocks, soft)
+
+
+def _costs(tasks: Sequence[Task], eom: EquationsOfMotion, t: float) -> Costs:
+    """Return block, weight and residual of each task at a state."""
+    return [(task.block, task.weight, residual_of(task, eom, t)) for task in tasks]
 
 
 def _objective(costs: Costs, blocks: Mapping[str, slice], n: int) -> tuple[Array, Array]:

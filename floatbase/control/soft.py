@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from floatbase._validation import Array, Value, as_positive, read_only
 from floatbase.affine import Affine
+from floatbase.control.problem import Problem
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion, FrictionContact, MotionConstraint
 from floatbase.objectives import Task
 from floatbase.robots import State
@@ -85,15 +86,17 @@ class ContactMotionTask(Value):
         return Affine(A, -b)
 
 
-def with_soft_contacts(
-    contacts: Contacts, tasks: Sequence[Task], weight: float
-) -> tuple[Contacts, tuple[Task, ...]]:
-    """Return soft contacts and tasks from contacts and tasks that may be soft or rigid."""
-    rigid = Contacts([c.contact if isinstance(c, SoftConstraint) else c for c in contacts])
-    other_tasks = [task for task in tasks if not isinstance(task, ContactMotionTask)]
-    motion_task = ContactMotionTask(rigid, as_positive("contact_weight", weight))
+def with_soft_contacts(problem: Problem, weight: float) -> Problem:
+    """Return a problem with soft contacts from one whose contacts may be soft or rigid."""
+    rigid = Contacts([c.contact if isinstance(c, SoftConstraint) else c for c in problem.contacts])
     soft = [SoftContact(c) if isinstance(c, FrictionContact) else SoftConstraint(c) for c in rigid]
-    return Contacts(soft), (*other_tasks, motion_task)
+    motion = ContactMotionTask(rigid, as_positive("contact_weight", weight))
+    others = [task for task in problem.tasks if not isinstance(task, ContactMotionTask)]
+    if not problem.level_sizes:
+        return replace(problem, contacts=Contacts(soft), tasks=[*others, motion])
+    first, *sizes = problem.level_sizes  # the contacts come first
+    sizes = [first + len(others) + 1 - len(problem.tasks), *sizes]
+    return replace(problem, contacts=Contacts(soft), tasks=[motion, *others], level_sizes=sizes)
 
 
 def contact_weight_of(tasks: Sequence[Task]) -> float | None:

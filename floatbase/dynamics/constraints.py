@@ -128,10 +128,8 @@ class LinearConstraint(Value):
                 f"function of {self.name} must return the two arrays A and b of A q̈ = b, not "
                 f"{short_repr(result)}."
             )
-        A, b = result
-        return as_array(f"A of {self.name}", A, (self.m, state.robot.nv)), as_array(
-            f"b of {self.name}", b, (self.m,)
-        )
+        A = as_array(f"A of {self.name}", result[0], (self.m, state.robot.nv))
+        return A, as_array(f"b of {self.name}", result[1], (self.m,))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import MappingProxyType
 
 import numpy as np
 
 from floatbase._validation import Array
 from floatbase.affine import Affine
-from floatbase.qp.problem import QP, InequalityQP
+from floatbase.qp.problem import QP, in_coordinates
 
 # fraction of a matrix by which its product with orthonormal columns may differ from zero
 _RANK_TOLERANCE = 1e-12
@@ -39,11 +38,6 @@ def in_residuals(
     g, G = np.zeros(n), level.G @ free
     g[:rank] = unit * (U[:, :rank].T @ weighted[:, -1])
     G[np.linalg.norm(G, axis=1) <= _ROW_TOLERANCE * level.row_norms] = 0.0
-    change = InequalityQP._unchecked(
-        H=np.diag(np.where(np.arange(n) < rank, unit**2, 0.0)), g=g,
-        A=np.zeros((0, n)), b=np.zeros(0), G=G @ columns, h=level.h - level.G @ x,
-        row_norms=level.row_norms,
-        equality_names=(), inequality_names=level.inequality_names, blocks=MappingProxyType({}),
-        penalties=level.penalties,
-    )  # fmt: skip
+    H = np.diag(np.where(np.arange(n) < rank, unit**2, 0.0))
+    change = in_coordinates(level, H, g, G @ columns, level.h - level.G @ x)
     return change, free @ columns, rank

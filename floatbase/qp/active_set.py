@@ -190,21 +190,16 @@ def active_set(
             f"Pass qp.with_slacks(), or dataclasses.replace(qp, penalties=None) to make them hard."
         )
     space, problem = qp.equality_space, qp.reduced
-    rows = _independent_rows(
-        problem, [_index(qp, name) for name in as_strings("working_set", working_set)]
-    )
+    given = [_index(qp, name) for name in as_strings("working_set", working_set)]
+    rows = _independent_rows(problem, given)
     initial = None if start is None else space.A.T @ (as_array("start", start, (qp.n,)) - space.b)
-    budget = (
-        _UNLIMITED
-        if max_iterations is None
-        else as_integer("max_iterations", max_iterations, 1, _UNLIMITED)
-    )
+    limit = _UNLIMITED if max_iterations is None else max_iterations
+    budget = as_integer("max_iterations", limit, 1, _UNLIMITED)
     phase_one = _feasible_start(problem, _starting_point(problem, initial, rows), rows, budget)
-    result = (
-        _iterate(problem, phase_one.x, phase_one.rows, budget - len(phase_one.iterations))
-        if phase_one.converged
-        else replace(phase_one, iterations=[])
-    )
+    result = replace(phase_one, iterations=[])
+    if phase_one.converged:
+        budget -= len(phase_one.iterations)
+        result = _iterate(problem, phase_one.x, phase_one.rows, budget)
     if result.converged and np.any(_violated(problem, result.x)):
         # rows so nearly parallel that the method treats them as one
         raise SolverError(
@@ -288,18 +283,13 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
     if not np.any(violated):
         return _Result(y, rows, np.zeros(0), [])
     s_row = len(problem.G)
+    H, g = np.zeros((n + 1, n + 1)), np.eye(n + 1)[-1]
+    G = np.block([[problem.G, -(norms * violated)[:, None]], [-g]])
+    names = (*problem.inequality_names, ConstraintLabel(_SLACK_CONSTRAINT))
     relaxed = InequalityQP(
-        H=np.zeros((n + 1, n + 1)),
-        g=np.eye(n + 1)[-1],
-        A=np.zeros((0, n + 1)),
-        b=np.zeros(0),
-        G=np.block(
-            [[problem.G, -(norms * violated)[:, None]], [np.zeros((1, n)), -np.ones((1, 1))]]
-        ),
-        h=np.append(problem.h, 0.0),
-        row_norms=np.append(norms, 1.0),
-        inequality_names=(*problem.inequality_names, ConstraintLabel(_SLACK_CONSTRAINT)),
-    )
+        H, g, H[:0], g[:0], G, np.append(problem.h, 0.0),
+        row_norms=np.append(norms, 1.0), inequality_names=names,
+    )  # fmt: skip
     worst = int(np.argmax(violation))
     result = _iterate(
         relaxed, np.append(y, violation[worst]), [*rows, worst], max_iterations, last=s_row
@@ -307,10 +297,8 @@ def _feasible_start(problem: QP, y: Array, rows: list[int], max_iterations: int)
     if result.converged and result.rows[-1] != s_row and np.any(_violated(problem, result.x[:-1])):
         # the shares of the violated rows add up to 1
         share = result.multipliers * relaxed.row_norms[result.rows]
-        raise infeasible(
-            problem.inequality_names[i]
-            for i in sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE])
-        )
+        conflict = sorted(np.array(result.rows)[share > MULTIPLIER_TOLERANCE])
+        raise infeasible(problem.inequality_names[i] for i in conflict)
     working = _independent_rows(problem, [i for i in result.rows if i != s_row])
     return _Result(
         result.x[:-1], working, np.zeros(len(working)), result.iterations, result.converged

@@ -38,12 +38,8 @@ def infeasible(constraints: Iterable[str]) -> InfeasibleError:
         kinds: dict[str, list[str]] = {}
         for label in labels:
             kinds.setdefault(label.kind, []).append(label.owner if label.number is None else label)
-        text = (
-            "".join(
-                f"\n  {len(owners)} × {kind}: {', '.join(owners)}" for kind, owners in kinds.items()
-            )
-            + "\n"
-        )
+        groups = [f"  {len(each)} × {kind}: {', '.join(each)}\n" for kind, each in kinds.items()]
+        text = "\n" + "".join(groups)
     return InfeasibleError(
         f"No point satisfies all constraints. Given the equalities, these are in conflict:{text}"
         "Relax or remove at least one of them. Other constraints may be in conflict, too.",
@@ -110,24 +106,17 @@ def conflicting_constraints(G: Array, h: Array) -> tuple[int, ...]:
         return ()
     norm_G, norm_h = float(np.max(np.abs(G), initial=0.0)) or 1.0, float(np.max(np.abs(h))) or 1.0
     relaxed = h + violation_tolerance(h)
+    columns = np.vstack([G.T / norm_G, relaxed / norm_h])
     target = np.append(np.zeros(G.shape[1]), -1.0)
     try:
-        m, _ = nnls(
-            np.vstack([G.T / norm_G, relaxed / norm_h]),
-            target,
-            maxiter=_STEPS_PER_CONSTRAINT * len(G),
-        )
+        m, _ = nnls(columns, target, maxiter=_STEPS_PER_CONSTRAINT * len(G))
     except RuntimeError as error:
         raise SolverError(
             f"The search for conflicting constraints among {len(G)} rows did not end: {error}. "
             f"Check the scaling of the problem."
         ) from None
     m /= np.sum(m) or 1.0
-    infeasible_certificate = (
-        np.max(np.abs(G.T @ m), initial=0.0) <= _ROUNDING * norm_G and relaxed @ m < 0.0
-    )
-    return (
-        tuple(int(row) for row in np.flatnonzero(m > MULTIPLIER_TOLERANCE))
-        if infeasible_certificate
-        else ()
-    )
+    gap = np.max(np.abs(G.T @ m), initial=0.0)
+    if gap > _ROUNDING * norm_G or relaxed @ m >= 0.0:  # no proof of infeasibility
+        return ()
+    return tuple(np.flatnonzero(m > MULTIPLIER_TOLERANCE).tolist())

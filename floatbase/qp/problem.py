@@ -269,12 +269,7 @@ class QP(Value):
         G, h = self.G @ Z, self.h - self.G @ x0
         G[np.linalg.norm(G, axis=1) <= _ROUNDING * self.row_norms] = 0.0
         h[np.abs(h) <= _ROUNDING * (np.abs(self.G) @ np.abs(x0) + np.abs(self.h))] = 0.0
-        return InequalityQP._unchecked(
-            H=0.5 * (H + H.T), g=g, A=np.zeros((0, g.size)), b=self.b[:0], G=G, h=h,
-            row_norms=self.row_norms,
-            equality_names=(), inequality_names=self.inequality_names, blocks=MappingProxyType({}),
-            penalties=self.penalties,
-        )  # fmt: skip
+        return in_coordinates(self, 0.5 * (H + H.T), g, G, h)
 
     @cached_property
     def row_norms(self) -> Array:
@@ -299,6 +294,15 @@ class InequalityQP(QP):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "row_norms", as_array("row_norms", self.row_norms, (len(self.G),)))
+
+
+def in_coordinates(qp: QP, H: Array, g: Array, G: Array, h: Array) -> InequalityQP:
+    """Return a problem in other coordinates, in which its equalities always hold, unchecked."""
+    return InequalityQP._unchecked(
+        H=H, g=g, A=np.zeros((0, g.size)), b=np.zeros(0), G=G, h=h, row_norms=qp.row_norms,
+        equality_names=(), inequality_names=qp.inequality_names, blocks=MappingProxyType({}),
+        penalties=qp.penalties,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=4096)

@@ -8,14 +8,8 @@ from floatbase.control.tick.compiled import (
     unsupported_reason,
 )
 from floatbase.control.tick.targets import TargetLayout
-from floatbase.control.tick.user_terms import TickInputs
 
 __all__ = [
-    "CompiledTick",
-    "TargetLayout",
-    "TickInputs",
-    "announce_if_slow",
-    "cache_warning",
-    "compiling_ahead",
+    "CompiledTick", "TargetLayout", "announce_if_slow", "cache_warning", "compiling_ahead",
     "unsupported_reason",
-]
+]  # fmt: skip

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from threading import Event, Thread, local
+from typing import cast
 
 import numpy as np
 
@@ -26,7 +27,8 @@ from floatbase.control.tick.problem_arrays import (
 )
 from floatbase.control.tick.targets import TargetLayout, compiled_rows
 from floatbase.control.tick.user_terms import TickInputs, UserTerms
-from floatbase.qp import QP
+from floatbase.objectives import Task
+from floatbase.qp import QP, Solution
 from floatbase.robots import Robot, State
 
 _RECHECK_INTERVAL = 1.0  # s between two checks whether numba is compiling
@@ -83,12 +85,10 @@ def cache_warning() -> str:
     """Return a remark for messages if compiled code cannot be kept on disk, otherwise ""."""
     from floatbase.control.tick import jit
 
+    if not jit.cache_error:
+        return ""
     remedy = "set NUMBA_CACHE_DIR to an empty, writable folder with free space"
-    return (
-        f"; compiled code cannot be kept on disk ({jit.cache_error}): {remedy}"
-        if jit.cache_error
-        else ""
-    )
+    return f"; compiled code cannot be kept on disk ({jit.cache_error}): {remedy}"
 
 
 def unsupported_reason(problem: Problem, solver: str) -> str:
@@ -139,33 +139,22 @@ class CompiledTick:
         self.layout, self.infeasible = TargetLayout(problem), dual_search.INFEASIBLE
         self.tables = pack_problem(problem, self.layout)
         self.user_terms = UserTerms(problem)
-        time_varying = {each.task_index for each in self.layout.tasks if each.task.is_time_varying}
-        self.unchecked_tasks = [
-            task
-            for i, task in enumerate(problem.tasks)
-            if i in time_varying or not compiled_rows(task)
-        ]
+        # those whose targets or residuals are functions
+        self.unchecked_tasks = [cast(Task, each.task) for each in self.layout.varying]
+        self.unchecked_tasks += [task for task in problem.tasks if not compiled_rows(task)]
         self.default_inputs = self.user_terms.constant_inputs(
             self.layout.constant, int(self.tables[0][N_CONTACT_NUMBERS])
         )
-        self._q_shape = (robot.nq,)
-        self._v_shape = (nv,)
-        self._n_multipliers = nv + k
+        self._q_shape, self._v_shape, self._n_multipliers = (robot.nq,), (nv,), nv + k
         self.qdd, self.tau, self.forces = slice(0, nv), slice(nv, nv + d), slice(nv + d, nv + d + k)
+        self._tick, self._n_stages = tick.tick, tick.N_STAGES
         self._workspace_sizes = tick.workspace_sizes
-        self._tick = tick.tick
-        self._n_stages = tick.N_STAGES
-        self._varies = self.layout.varies or self.user_terms.varies
+        self._varies = bool(self.layout.varying) or self.user_terms.varies
         limits = problem.limits
-        inequalities = limits.all_inequalities(problem.contacts)
-        joint_limits = limits.joint_limits
-        joint_weight = None if joint_limits is None else joint_limits.weight
-        # weights of the groups of user-defined inequalities, and of the joint limits
-        self._soft_weights = [each.weight or np.inf for each in inequalities]
-        self._joint_weight = joint_weight or np.inf
-        self._has_soft = np.isfinite(min(self._soft_weights, default=np.inf)) or (
-            joint_weight is not None
-        )
+        # weights of the joint limits, and of the groups of user-defined inequalities
+        soft = limits.joint_limits, *limits.all_inequalities(problem.contacts)
+        self._soft_weights = [(each and each.weight) or np.inf for each in soft]
+        self._has_soft = bool(np.isfinite(self._soft_weights).any())
         self._sizes = self._workspace_sizes(self.tables[0], self.default_inputs.packed.size)
         # without user-defined inequalities
         self._result_size = self.forces.stop + 2 * self._n_multipliers + 2 * d * self._has_soft
@@ -207,8 +196,7 @@ class CompiledTick:
     ) -> tuple[Array, Indices]:
         """Run one tick for each row of Q and V; return their (q̈, τ, λ) and their codes.
 
-        Q, V: contiguous and writable. targets: of all states, or one row for each. User functions
-        are called in this thread only.
+        Q, V: contiguous and writable. User functions are called in this thread only.
         """
         from floatbase.control.tick import loop, tick
 
@@ -217,20 +205,15 @@ class CompiledTick:
         size = min(max(-(-n // n_threads), _MIN_CHUNK), _MAX_CHUNK)
         chunks = [slice(first, min(first + size, n)) for first in range(0, n, size)]
         run_ticks = loop.compiled_loop(self._tick)
-        one_row_each = targets is not None and targets.ndim == 2
 
         def inputs_of(rows: slice) -> list[TickInputs]:
             """Return the inputs of each row, or of all rows together if they are equal."""
             if not self._varies and targets is None:
                 return [self.default_inputs]
-            if not self.user_terms.varies and targets is not None:
-                packed = np.tile(self.default_inputs.packed, (rows.stop - rows.start, 1))
-                packed[:, : self.layout.size] = targets[rows] if one_row_each else targets
-                return [TickInputs(row, *self.default_inputs[1:]) for row in packed]
             all_inputs = []
             for i in range(rows.start, rows.stop):
-                of_row = targets[i] if targets is not None and one_row_each else targets
-                inputs = self.inputs_at(Q[i], V[i], float(times[i]), of_row)
+                given = None if targets is None else targets[i]
+                inputs = self.inputs_at(Q[i], V[i], float(times[i]), given)
                 if inputs is None:
                     failed.append(i)
                 all_inputs.append(inputs or self.default_inputs)
@@ -309,21 +292,21 @@ class CompiledTick:
         """
         eom, costs = self.user_terms.equations(State(self._problem.robot, q, v), t, inputs), []
         for i, task in enumerate(self.layout.fixed_tasks(inputs.packed[: self.layout.size])):
-            weight_and_residual = (
-                inputs.residuals[i]
-                if i in inputs.residuals
-                else (task.weight, residual_of(task, eom, t))
-            )
-            costs.append((task.block, *weight_and_residual))
-        limits = self._problem.limits
-        inequalities = [
-            each.at(eom, t) if given is None else given
-            for each, given in zip(
-                limits.all_inequalities(eom.contacts), inputs.inequalities, strict=True
-            )
-        ]
-        qp = assemble_qp(eom, costs, limits, inputs.normal_forces, inequalities)
+            given = inputs.residuals.get(i) or (task.weight, residual_of(task, eom, t))
+            costs.append((task.block, *given))
+        limits, end = self._problem.limits, self.layout.size + 2 * eom.contacts.n_points
+        both = zip(limits.all_inequalities(eom.contacts), inputs.inequalities, strict=True)
+        inequalities = [each.at(eom, t) if given is None else given for each, given in both]
+        minimum, maximum = inputs.packed[self.layout.size : end].reshape(2, -1)
+        qp = assemble_qp(eom, costs, limits, (minimum, maximum), inequalities)
         return modified_qp(self._problem, qp, eom)
+
+    def solution(
+        self, q: Array, v: Array, t: float, result: Array, n_active: int, inputs: TickInputs
+    ) -> Solution:
+        """Return the reference QP of a tick with the tick's answer; what `__call__` returned."""
+        qp, mu = self.qp(q, v, t, inputs), self.multipliers(q, result, n_active, inputs)
+        return Solution(qp, result[: self.forces.stop], mu, "compiled", n_active)
 
     def pack(self, problem: Problem) -> tuple[Indices, Indices, Array]:
         """Return a problem with the same tasks as arrays for the tick: sizes, integers, floats."""
@@ -369,23 +352,14 @@ class CompiledTick:
                 user_rows[end - len(points) : end] = False
                 user_rows[end - len(points) + np.array(support_corners(points))] = True
         has_row = np.concatenate(
-            [
-                friction,
-                hard_maximum(contacts, limits),
-                limited,
-                limited,
-                joints,
-                user_rows,
-            ]
+            [friction, hard_maximum(contacts, limits), limited, limited, joints, user_rows]
         )
         sizes = self.forces.stop, 2 * self._n_multipliers
         mu, active = result[sizes[0] : sum(sizes)].reshape(2, -1)[:, :n_active]
         all_rows = np.zeros(has_row.size)
         all_rows[active.astype(np.int64)] = np.maximum(mu, 0.0)
         if self._has_soft:
-            weights = np.append(
-                np.full(2 * d, self._joint_weight), np.repeat(self._soft_weights, group_sizes)
-            )
+            weights = np.repeat(self._soft_weights, [2 * d, *group_sizes])
             soft_rows, saturated = all_rows[-len(weights) :], result[sum(sizes) :] > 0.0
             # rows with the opposite sign start at their weight
             soft_rows[saturated] = np.maximum(weights - soft_rows, 0.0)[saturated]
@@ -397,8 +371,11 @@ class CompiledTick:
     ) -> TickInputs | None:
         """Return the inputs of a tick, in new arrays since other threads may run ticks too."""
         try:
-            if targets is None:
-                targets = self.layout.at(t) if self.layout.varies else self.layout.constant
-            return self.user_terms.inputs(targets, q, v, t)
+            targets = self.layout.at(t) if targets is None else targets
+            if self.user_terms.varies:
+                return self.user_terms.inputs(targets, q, v, t)
+            packed = self.default_inputs.packed.copy()
+            packed[: self.layout.size] = targets
+            return TickInputs(packed, *self.default_inputs[1:])
         except Exception:  # user code may raise anything
             return None

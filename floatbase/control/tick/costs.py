@@ -146,11 +146,8 @@ def motion_task(i, tasks: TaskTable, bodies: Bodies, rows):
         (e_dot, drift), coriolis = point_velocity(bodies, joint, p), 2.0
         reference_velocity, reference_drift = point_velocity(bodies, reference, p)
     else:
-        e_dot, drift, coriolis = (
-            row_part(bodies.velocity, joint, 3),
-            row_part(bodies.drift, joint, 3),
-            1.0,
-        )
+        e_dot, drift = row_part(bodies.velocity, joint, 3), row_part(bodies.drift, joint, 3)
+        coriolis = 1.0
         reference_velocity, reference_drift = omega, row_part(bodies.drift, reference, 3)
     if kind == ORIENTATION:
         y, z = strided(targets, at + 1, stride), strided(targets, at + 2, stride)

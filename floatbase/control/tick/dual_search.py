@@ -383,12 +383,14 @@ def dual_search(
     H, grad = take_matrix(workspace, nb + 1, nb + 1), take_vector(workspace, nb)
     L = H[:nb]
     W, U = take_matrix(workspace, nb, nb), take_matrix(workspace, nb, nb)
-    rows = take_matrix(workspace, nb, nb)
+    rows, weights = take_matrix(workspace, nb, nb), take_vector(workspace, nb)
     bounds, row = take_vector(workspace, nb), take_vector(workspace, nb)
     step, z, r = take_vector(workspace, nb), take_vector(workspace, nb), take_vector(workspace, nb)
-    forces, tau = take_vector(workspace, k), take_vector(workspace, d)
-    qdd = take_vector(workspace, nv)
-    weights = take_vector(workspace, nb)
+    forces, tau, qdd = (
+        take_vector(workspace, k),
+        take_vector(workspace, d),
+        take_vector(workspace, nv),
+    )
     active = ActiveSet(indices, mu, bounds, rows, W, U, weights)
     has_soft = limits.saturated.size > 0
     clear(limits.saturated)

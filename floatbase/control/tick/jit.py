@@ -57,19 +57,11 @@ cache_error = ""  # why compiled code cannot be kept on disk
 
 def source_digest(folder: Path = Path(__file__).parent) -> int:
     """Return a digest of this folder's text, and of all that is imported and compiled in."""
-    text = repr(
-        (
-            INCONSISTENCY_TOLERANCE,
-            CONSTRAINT_RANK_TOLERANCE,
-            CONSTRAINT_NOISE,
-            FEASIBILITY_TOLERANCE,
-            MIN_TILT,
-            UNIT_NORM_TOLERANCE,
-        )
-    ).encode()
+    text = f"{INCONSISTENCY_TOLERANCE} {CONSTRAINT_RANK_TOLERANCE} {CONSTRAINT_NOISE}"
+    text += f" {FEASIBILITY_TOLERANCE} {MIN_TILT} {UNIT_NORM_TOLERANCE}"
     for file in (Path(_geometry.__file__), *sorted(folder.glob("*.py"))):
-        text += file.name.encode() + file.read_bytes()
-    return int.from_bytes(sha256(text).digest()[:7], "big")
+        text += file.name + file.read_text(encoding="utf-8")
+    return int.from_bytes(sha256(text.encode()).digest()[:7], "big")
 
 
 def jit_cached(make: Callable[[int], Callable[..., Any]], **options: bool) -> Any:

@@ -130,12 +130,8 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             row, force = row + m, force + k
             continue
         R, p = frame_pose(bodies, joint, contacts.frames, i)
-        up, up_rate, radius = (
-            row_part(contacts.frames, i, 12),
-            (0.0, 0.0, 0.0),
-            contacts.frames[i, 15],
-        )
-        omega = row_part(bodies.velocity, joint, 3)
+        up, up_rate = row_part(contacts.frames, i, 12), (0.0, 0.0, 0.0)
+        radius, omega = contacts.frames[i, 15], row_part(bodies.velocity, joint, 3)
         if kind == WHEEL:
             axis = row_part(contacts.frames, i, 16)
             up, up_rate, has_lowest_point = wheel_direction(R, axis, up, omega)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from floatbase._validation import Array, as_array
+from floatbase._validation import Array, as_array, cached_property
 from floatbase.control.problem import Problem
 from floatbase.errors import InputError
 from floatbase.objectives import Task
@@ -71,31 +71,24 @@ class TargetLayout:
         self.names = MappingProxyType(
             {each.task.name: each.entries for each in reversed(self.tasks)}
         )
-        self._varying = [each for each in self.tasks if each.task.is_time_varying]
-        self._constant: Array | None = None
-
-    @property
-    def varies(self) -> bool:
-        """Whether a target is a function of time."""
-        return bool(self._varying)
+        # those that are functions of time
+        self.varying = [each for each in self.tasks if each.task.is_time_varying]
 
     def at(self, t: float) -> Array:
         """Return all targets at a time, a new array."""
-        targets, each_varying = self.constant.copy(), self._varying
-        for each in each_varying:
+        targets = self.constant.copy()
+        for each in self.varying:
             self._write(each, targets, t)
         return targets
 
-    @property
+    @cached_property
     def constant(self) -> Array:
         """Array with the constant targets, and zeros for those that are functions of time."""
-        if self._constant is None:
-            targets = np.zeros(self.size)
-            for each in self.tasks:
-                if not each.task.is_time_varying:
-                    self._write(each, targets, 0.0)
-            self._constant = targets
-        return self._constant
+        targets = np.zeros(self.size)
+        for each in self.tasks:
+            if not each.task.is_time_varying:
+                self._write(each, targets, 0.0)
+        return targets
 
     def _write(self, each: TaskTargets, targets: Array, t: float) -> None:
         """Write the targets of one task at a time into the array."""

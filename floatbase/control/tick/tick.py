@@ -118,15 +118,9 @@ def workspace_sizes(
     sizes: as for `unpack`. n_inputs: size of the inputs. n_user_rows: number of rows of all
     user-defined tasks.
     """
-    n_joints, n_tasks, n_points, m, d, k = (
-        int(sizes[entry])
-        for entry in (
-            size.N_JOINTS, size.N_TASKS, size.N_POINTS, size.N_MOTION_ROWS, size.N_DRIVEN,
-            size.N_FORCES,
-        )
-    )  # fmt: skip
-    base = 6
-    nv = d + base
+    n_joints, n_tasks, n_points = sizes[[size.N_JOINTS, size.N_TASKS, size.N_POINTS]].tolist()
+    m, d, k = sizes[[size.N_MOTION_ROWS, size.N_DRIVEN, size.N_FORCES]].tolist()
+    base, nv = 6, d + 6
     n = nv + k  # and no more β than that
     contact = bodies_size(n_joints, nv) + (k + m) * nv + m + 3 * n_points
     elimination = (m + base) * (n + 1) + 2 * (2 * n + m + base) + m * nv + m
@@ -236,11 +230,8 @@ def make_tick(digest):
         if smallest_pivot <= ZERO_ROW:
             return INACCURATE
         nb = n - m - passive
-        space = Parametrisation(
-            take_matrix(float_workspace, n, nb + 1),
-            take_vector(int_workspace, n),
-            take_matrix(float_workspace, d, nb + 1),
-        )
+        V, T = take_matrix(float_workspace, n, nb + 1), take_matrix(float_workspace, d, nb + 1)
+        space = Parametrisation(V, take_vector(int_workspace, n), T)
         parametrise(B, pivots, m, take_vector(int_workspace, nb), space.V, space.beta_index)
         torques(space.V, space.beta_index, M, h, J_points, base, space.T)
         if stages == 3:

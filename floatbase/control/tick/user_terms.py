@@ -49,8 +49,6 @@ class TickInputs(NamedTuple):
     contacts: Sequence[tuple[Array, ...]] = ()
     # weight and residual of user-defined tasks, by their index in the problem
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType({})
-    # minimum and maximum of each point, (P,)
-    normal_forces: tuple[Array, Array] = (np.zeros(0), np.zeros(0))
     # G and h of user-defined rows, None for rows that the tick computes
     inequalities: Sequence[tuple[Array, Array] | None] = ()
 
@@ -75,27 +73,14 @@ class UserTerms:
             (each, _fixed_group(problem, each))
             for each in self._limits.all_inequalities(problem.contacts)
         ]
-        groups = [fixed or _NO_ROWS for _, fixed in self._inequalities]
-        self._fixed_numbers, self._fixed_rows = (
-            [each[0] for each in groups],
-            [each[1] for each in groups],
-        )
-        functions = [each for each, fixed in self._inequalities if fixed is None]
-        self.any = bool(self._tasks or self._contacts or functions)
-        self._needs_state = {kind for _, kind in self._contacts} != {DRIVEN_FRAME} or bool(
-            self._tasks or functions
-        )
-        self.varies = self.any or self._limits.time_varying
+        # of the terms that need a state
         self.names = [contact.name for contact, kind in self._contacts if kind == USER_DEFINED]
         self.names += [task.name for _, task, _ in self._tasks]
-        self.names += [each.name for each in functions]
-        bounds = np.zeros((2, problem.contacts.n_points))  # placeholders if they vary with time
-        self._constant_bounds = (
-            (bounds[0], bounds[1])
-            if self._limits.time_varying
-            else self._limits.hard_normal_forces(problem.contacts)
-        )
-        self._finite_bounds = _finite(self._constant_bounds)
+        self.names += [each.name for each, fixed in self._inequalities if fixed is None]
+        self.any = bool(self.names or self._contacts)
+        self.varies = self.any or self._limits.time_varying
+        placeholders = np.zeros(2 * problem.contacts.n_points)
+        self._constant_bounds = placeholders if self._limits.time_varying else self._bounds_at(0.0)
 
     def constant_inputs(self, targets: Array, n_contact_numbers: int) -> TickInputs:
         """Return targets and all that is constant, and zeros for what functions return.
@@ -103,35 +88,26 @@ class UserTerms:
         There are as many zeros as a tick without a state needs.
         """
         zeros = np.zeros(n_contact_numbers + 3 * len(self._tasks))
-        packed = [targets, *self._finite_bounds, zeros, *self._fixed_numbers]
-        return TickInputs(
-            np.concatenate(packed),
-            normal_forces=self._constant_bounds,
-            inequalities=self._fixed_rows,
-        )
+        groups = [fixed or _NO_ROWS for _, fixed in self._inequalities]
+        packed = [targets, self._constant_bounds, zeros, *(numbers for numbers, _ in groups)]
+        return TickInputs(np.concatenate(packed), inequalities=[rows for _, rows in groups])
+
+    def _bounds_at(self, t: float) -> Array:
+        """Return the minimum, then the maximum normal force of each point at a time, (2 P,)."""
+        bounds: Array = np.concatenate(self._limits.hard_normal_forces(self._problem.contacts, t))
+        return bounds.clip(max=UNBOUNDED)
 
     def inputs(self, targets: Array, q: Array, v: Array, t: float) -> TickInputs:
         """Return the inputs of a tick at a state.
 
         Raises `InputError`, or what user functions raise.
         """
-        problem, limits = self._problem, self._limits
-        bounds, finite = self._constant_bounds, self._finite_bounds
-        if limits.time_varying:
-            bounds = limits.hard_normal_forces(problem.contacts, t)
-            finite = _finite(bounds)
-        packed: list[npt.ArrayLike] = [targets, *finite]
-        if not self.any:
-            packed += self._fixed_numbers
-            return TickInputs(
-                np.concatenate(packed), normal_forces=bounds, inequalities=self._fixed_rows
-            )
-        contacts = list[tuple[Array, ...]]()
-        residuals = {}
-        n_user_rows = 0
-        inequalities = []
+        problem, contacts, inequalities = self._problem, list[tuple[Array, ...]](), []
+        bounds = self._bounds_at(t) if self._limits.time_varying else self._constant_bounds
+        packed: list[npt.ArrayLike] = [targets, bounds]
+        residuals, n_user_rows = dict[int, tuple[float, Affine]](), 0
         eom: Any = None
-        if self._needs_state:
+        if self.names:
             state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
             eom = EquationsOfMotion(state, problem.contacts, t)
         for contact, kind in self._contacts:
@@ -156,9 +132,7 @@ class UserTerms:
             numbers, rows = fixed or _group(each, eom, t)
             packed.append(numbers)
             inequalities.append(rows)
-        return TickInputs(
-            np.concatenate(packed), n_user_rows, contacts, residuals, bounds, inequalities
-        )
+        return TickInputs(np.concatenate(packed), n_user_rows, contacts, residuals, inequalities)
 
     def equations(self, state: State, t: float, inputs: TickInputs) -> EquationsOfMotion:
         """Return the equations (7) with the values of user-defined contacts in a tick."""
@@ -197,8 +171,3 @@ def _fixed_group(problem: Problem, each: LinearInequality) -> Group | None:
     if callable(given):
         return None
     return _group(each, EquationsOfMotion(problem.robot.standing(), problem.contacts))
-
-
-def _finite(bounds: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Replace infinite upper bounds of normal forces with `UNBOUNDED`."""
-    return bounds[0], np.minimum(bounds[1], UNBOUNDED)
