@@ -134,7 +134,7 @@ def right():
 NOT_CALLED = """
     EquationsOfMotion FeasibleSpace Rollout Solution Iteration ActiveSetRun Residuals Decomposition
     TorquesFromForces CylinderGeometry PowerBalance Robot PushRecovery StepPlan
-    Command ConstraintLabel recording.Animation HydraulicState Item SliderPanel Term
+    Command CommandBatch ConstraintLabel recording.Animation HydraulicState Item SliderPanel Term
     NumericJudge check compare hand_in import_answers predict recall reveal review
     Playground playground sweep read_sweep push_recovery
     conflicting_constraints constraint_and_jacobian raibert_foothold TorqueCommand State.unchecked

@@ -46,7 +46,12 @@ def motor_fault(box: BlackBox) -> str:
     return swapped_joints(box, got, commanded, off)
 
 
-def swapped_joints(box: BlackBox, got: np.ndarray, commanded: np.ndarray, off: np.ndarray) -> str:
+def swapped_joints(
+    box: BlackBox,
+    got: np.ndarray,
+    commanded: np.ndarray,
+    off: np.ndarray,
+) -> str:
     """Find two joints that got each other's commands, within torque limits."""
     names, limits = box.robot.joint_names, box.robot.torque_limits
     best, found = 0.3, ""
