@@ -54,13 +54,17 @@ def machine() -> str:
 # times --------------------------------------------------------------------------------------------
 
 
-def clock(call: Callable[..., object], arguments: Sequence[tuple[object, ...]]) -> np.ndarray:
-    """Measure each call [µs]."""
+def clock(
+    call: Callable[..., object],
+    arguments: Sequence[tuple[object, ...]],
+    now: Callable[[], int] = time.perf_counter_ns,
+) -> np.ndarray:
+    """Measure each call [µs]; now: a clock [ns]."""
     times = np.empty(len(arguments))
     for i, args in enumerate(arguments):
-        start = time.perf_counter_ns()
+        start = now()
         call(*args)
-        times[i] = 1e-3 * (time.perf_counter_ns() - start)
+        times[i] = 1e-3 * (now() - start)
     return times
 
 
