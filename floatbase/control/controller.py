@@ -42,6 +42,7 @@ from floatbase.errors import InfeasibleError, InputError, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
+from floatbase.robots._upright import pose_question
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
@@ -427,7 +428,12 @@ class WholeBodyController:
             if command is not None:
                 return command
         softest = (self, *self._softer_controllers)[-1]
-        return softest._reference_command(q, v, *self._checked_inputs(v, t, targets))
+        try:
+            return softest._reference_command(q, v, *self._checked_inputs(v, t, targets))
+        except InfeasibleError as error:
+            if not (question := pose_question(State(self.robot, q))):
+                raise
+            raise InfeasibleError(f"{error} {question}", error.constraints) from None
 
     def attempt(
         self,
