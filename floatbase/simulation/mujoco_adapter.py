@@ -208,6 +208,8 @@ class MujocoAdapter:
                 wrong[name] = f"{len(motors)} actuators" if motors else "no actuator"
             elif not is_torque_motor(model, motors[0]):
                 wrong[name] = "a servo or another actuator that is not a torque motor"
+            elif not gear(model, motors[0]) * model.actuator_gainprm[motors[0], 0]:
+                wrong[name] = "a motor with a gear or a gain of zero"
         if wrong:
             name, reason = next(iter(wrong.items()))
             raise InputError(
@@ -244,11 +246,13 @@ class MujocoAdapter:
                 angle = float(np.linalg.norm(pin.log3(difference.rotation))) if is_last else 0.0
                 distance = float(np.linalg.norm(difference.translation))
                 if max(angle, distance) > _LARGEST_DIFFERENCE:
+                    free = model.body(model.body_rootid[body]).name
                     raise InputError(
                         f"{model.joint(joint).name} in the scene is not the joint {name} of "
                         f"{robot.name}: for equal joint positions its link is {distance:.3g} m and "
                         f"{angle:.3g} rad away. Its axis, its zero or a length before it differs. "
-                        f"Load the robot from the file of the scene with fb.load_mjcf."
+                        f"Load the robot from the file of the scene with fb.load_mjcf. If its base "
+                        f"is welded to the body {free!r}, their frames must coincide."
                     )
         return mount or pin.SE3.Identity()
 
