@@ -227,15 +227,11 @@ class TargetTask(Value):
             sides.append(((4.0 * near - far) / (2.0 * step), (far - 2.0 * near) / step**2))
         if not sides:
             raise InputError(
-                f"The target function of {self.name} returned the target alone at {t:g} s. It "
-                f"cannot be differentiated there, because it raised {type(failure).__name__} for "
-                f"times nearby. Let it return {self._all_hint}."
+                f"The target function of {self.name} cannot be differentiated at {t:g} s: it "
+                f"raised {type(failure).__name__} nearby. Let it return {self._all_hint}."
             ) from failure
         smoothest = min(sides, key=lambda side: float(np.linalg.norm(side[1])))
-        return [
-            as_array(f"{name} of {self.name}", rate, shape)
-            for (name, shape), rate in zip(rates, smoothest, strict=False)
-        ]
+        return list(smoothest[: len(rates)])
 
     def _displacement(self, start: Array, end: Array, robot: Robot) -> Array:
         """Return the displacement between two targets whose time derivative is the second one."""

@@ -30,6 +30,7 @@ def is_torque_motor(model: mujoco.MjModel, motor: int) -> bool:
         model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
         and model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_NONE
         and model.actuator_dyntype[motor] != mujoco.mjtDyn.mjDYN_INTEGRATOR
+        and model.actuator_gainprm[motor, 0] * gear(model, motor) != 0.0
     )
 
 

@@ -21,10 +21,7 @@ class Conversion:
     """Map q and v of a robot to qpos and qvel of its MuJoCo model, and back."""
 
     def __init__(self, robot: Robot, model: mujoco.MjModel, joints: Sequence[int] | None = None):
-        """Find the robot's free joint and its joints, which `joints` gives in the order of τ.
-
-        By default they have the same names in the model.
-        """
+        """Find the free joint, and the joints in the order of τ, by default by their names."""
         self._robot, self._sizes = robot, (model.nq, model.nv)
         self._n_base = 6 if robot.is_floating else 0
         if joints is None:

@@ -60,11 +60,6 @@ class MujocoAdapter:
     SimulationWarning
         If mass, gravity, joints or motor limits differ, or if a fixed base is elsewhere.
 
-    Notes
-    -----
-    MuJoCo uses quaternions w x y z, the base's linear velocity in the world frame, and its angular
-    velocity in the base frame. This package uses x y z w, and both velocities in the base frame.
-
     Examples
     --------
     >>> from floatbase.simulation import MujocoAdapter
@@ -84,8 +79,6 @@ class MujocoAdapter:
         self._model = as_instance(
             "model", model, mujoco.MjModel, "mujoco.MjModel.from_xml_path(…), or physics.model.ptr"
         )
-        if joint_names is None:
-            joint_names = _names_in_scene(robot, model)
         self._joints = _find_joints(robot, model, joint_names)
         self._root = _find_root(robot, model, self._joints)
         self._conversion = Conversion(robot, model, self._joints)
@@ -205,19 +198,17 @@ class MujocoAdapter:
             motors = motors_of(model, joint)
             found += motors
             if len(motors) != 1:
-                wrong[name] = f"{len(motors)} actuators" if motors else "no actuator"
+                wrong[name] = f"{len(motors) or 'no'} actuators"
             elif not is_torque_motor(model, motors[0]):
-                wrong[name] = "a servo or another actuator that is not a torque motor"
-            elif not gear(model, motors[0]) * model.actuator_gainprm[motors[0], 0]:
-                wrong[name] = "a motor with a gear or a gain of zero"
+                wrong[name] = "a servo, or a motor whose gear is zero"
         if wrong:
             name, reason = next(iter(wrong.items()))
             raise InputError(
                 f"Cannot write torques for {', '.join(wrong)}. {name} has {reason}, but it needs "
-                f"one torque motor. Change the scene before you compile it: load it with "
-                f"mujoco.MjSpec.from_file, call actuator.set_to_motor() for each of spec.actuators "
-                f"and set its ctrllimited to False. For a joint without an actuator, call "
-                f"spec.add_actuator(target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)."
+                f"one torque motor. Load the scene with mujoco.MjSpec.from_file. Before you "
+                f"compile it, call set_to_motor() for each of spec.actuators and set its "
+                f"ctrllimited to False, or add missing ones with spec.add_actuator(target=…, "
+                f"trntype=mujoco.mjtTrn.mjTRN_JOINT)."
             )
         scale = gear(model, found) * model.actuator_gainprm[found, 0]
         return model.actuator_ctrladr[found], scale
@@ -233,8 +224,7 @@ class MujocoAdapter:
             state = robot.random_state(seed)
             self.set_state(data, state)
             mujoco.mj_kinematics(model, data)
-            for number, name in enumerate(robot.joint_names):
-                joint = self._joints[number]
+            for joint, name in zip(self._joints, robot.joint_names, strict=True):
                 body = model.jnt_bodyid[joint]
                 theirs = pin.SE3(data.xmat[body].reshape(3, 3), data.xanchor[joint])
                 ours = pin.SE3(state.joint_transforms[robot.model.getJointId(name)])
@@ -246,13 +236,12 @@ class MujocoAdapter:
                 angle = float(np.linalg.norm(pin.log3(difference.rotation))) if is_last else 0.0
                 distance = float(np.linalg.norm(difference.translation))
                 if max(angle, distance) > _LARGEST_DIFFERENCE:
-                    free = model.body(model.body_rootid[body]).name
                     raise InputError(
                         f"{model.joint(joint).name} in the scene is not the joint {name} of "
                         f"{robot.name}: for equal joint positions its link is {distance:.3g} m and "
-                        f"{angle:.3g} rad away. Its axis, its zero or a length before it differs. "
-                        f"Load the robot from the file of the scene with fb.load_mjcf. If its base "
-                        f"is welded to the body {free!r}, their frames must coincide."
+                        f"{angle:.3g} rad away. Its axis, its zero or a length before it differs, "
+                        f"or the base is displaced from the body with the free joint. Load the "
+                        f"robot from the file of the scene with fb.load_mjcf."
                     )
         return mount or pin.SE3.Identity()
 
@@ -260,89 +249,52 @@ class MujocoAdapter:
         """Return what differs, but is no reason to refuse the scene."""
         robot, model, root = self.robot, self._model, self._root
         is_moving = (model.body_rootid == root) & (model.body_weldid > 0)
-        ours, theirs = robot.mass, float(model.body_mass[is_moving].sum())
-        if not robot.is_floating:
-            ours = sum(inertia.mass for inertia in robot.model.inertias[1:])
-        known = [*self._joints, free_joint(model, self._joints)]
-        others = [
-            model.joint(joint).name or f"number {joint}"
-            for joint in np.flatnonzero(is_moving[model.jnt_bodyid])
-            if joint not in known
-        ]
+        mass = sum(inertia.mass for inertia in robot.model.inertias[1:])
+        theirs = float(model.body_mass[is_moving].sum())
+        known = [*self._joints, *([free_joint(model, self._joints)] if robot.is_floating else [])]
+        moved = np.flatnonzero(is_moving[model.jnt_bodyid]).tolist()
+        others = [model.joint(i).name or f"number {i}" for i in moved if i not in known]
         limits = [largest_torque(model, joint) for joint in self._joints]
-        weaker = [
-            f"{name} ({limit:.4g} instead of {own:.4g} N·m)"
-            for name, limit, own in zip(robot.joint_names, limits, robot.torque_limits, strict=True)
-            if limit < (1.0 - _TOLERANCE) * own
-        ]
-        gravity, own_gravity = mount.rotation.T @ model.opt.gravity, robot.model.gravity.linear
-        is_elsewhere = not mount.isIdentity(_LARGEST_DIFFERENCE)
+        is_weaker = np.array(limits) < (1.0 - _TOLERANCE) * robot.torque_limits
+        weaker = np.array(robot.joint_names)[is_weaker].tolist()
+        place, gravity = mount.translation.round(3), mount.rotation.T @ model.opt.gravity
+        pull = np.abs(gravity - robot.model.gravity.linear).max()
         differences = {
-            f"weighs {theirs:.4g} kg instead of {ours:.4g} kg": (
-                abs(theirs - ours) > _TOLERANCE * ours
-            ),
+            f"weighs {theirs:.4g} kg instead of {mass:.4g} kg": abs(theirs / mass - 1) > _TOLERANCE,
             f"also has the joints {', '.join(others)}": bool(others),
             f"has weaker motors at {', '.join(weaker)}": bool(weaker),
-            f"is pulled by a gravity of {gravity.round(3)} m/s² in the axes of its base": (
-                np.abs(gravity - own_gravity).max() > _TOLERANCE * robot.gravity
-            ),
-            f"stands at {mount.translation.round(3)} m, but targets are relative to its base": (
-                is_elsewhere
+            f"has a gravity of {gravity.round(3)} m/s²": pull > _TOLERANCE * robot.gravity,
+            f"stands at {place} m, but targets are relative to its base": not mount.isIdentity(
+                _LARGEST_DIFFERENCE
             ),
         }
         return [difference for difference, applies in differences.items() if applies]
 
-    def __repr__(self) -> str:
-        return f"MujocoAdapter({self.robot.name}, joints {', '.join(self.joint_names[:2])}, …)"
 
-
-def _names_in_scene(robot: Robot, model: mujoco.MjModel) -> list[str]:
-    """Return the names of the robot's joints in the scene, which may share a prefix or a suffix."""
-    known = [model.joint(i).name for i in range(model.njnt)]
-    if set(robot.joint_names) <= set(known):
-        return list(robot.joint_names)
-    first, candidates = robot.joint_names[0], list[list[str]]()
-    for name in known:
-        prefix, found, suffix = name.partition(first)
-        names = [f"{prefix}{own}{suffix}" for own in robot.joint_names]
-        if found and set(names) <= set(known):
-            candidates.append(names)
-    if len(candidates) == 1:
-        return candidates[0]
-    if candidates:
-        prefix = candidates[0][0].removesuffix(first)
-        raise InputError(
-            f"The scene has {len(candidates)} robots with the joints of {robot.name}: "
-            f"{', '.join(names[0] for names in candidates)}, …. Choose one, for example with "
-            f"joint_names=[{prefix!r} + name for name in robot.joint_names]."
-        )
-    return list(robot.joint_names)  # `_find_joints` says which one is missing
-
-
-def _find_joints(robot: Robot, model: mujoco.MjModel, names: Sequence[str]) -> list[int]:
-    """Return the joints of the scene with these names, in the order of τ."""
-    names = as_strings("joint_names", names)
+def _find_joints(robot: Robot, model: mujoco.MjModel, names: Sequence[str] | None) -> list[int]:
+    """Return the robot's joints in the scene, whose names may share a prefix or a suffix."""
+    known = {model.joint(i).name: i for i in range(model.njnt)}
+    own = robot.joint_names
+    if names is None and not set(own) <= set(known):
+        parts = [name.partition(own[0]) for name in known if own[0] in name]
+        found = [[f"{prefix}{name}{suffix}" for name in own] for prefix, _, suffix in parts]
+        found = [candidate for candidate in found if set(candidate) <= set(known)]
+        if len(found) > 1:
+            raise InputError(
+                f"The scene has {len(found)} robots with the joints of {robot.name}: "
+                f"{', '.join(candidate[0] for candidate in found)}, …. Choose one with "
+                f"joint_names=[…], such as [{found[0][0]!r}, …], in the order of robot.joint_names."
+            )
+        names = found[0] if found else None
+    names = as_strings("joint_names", own if names is None else names)
     if not len(names) == len(set(names)) == robot.d:
         raise InputError(
             f"joint_names must be {robot.d} different names in the order of robot.joint_names, "
-            f"{', '.join(robot.joint_names[:3])}, …."
+            f"{', '.join(own[:3])}, …."
         )
-    known = {model.joint(i).name: i for i in range(model.njnt)}
-    for name, own in zip(names, robot.joint_names, strict=True):
-        if name not in known:
-            raise unknown_name(
-                "joint of the scene", name, filter(None, known),
-                "If its joints have other names, pass joint_names=[…] in the order of "
-                "robot.joint_names.",
-            )  # fmt: skip
-        kind = model.jnt_type[known[name]]
-        is_slide = "JointModelP" in robot.model.joints[robot.model.getJointId(own)].shortname()
-        expected = mujoco.mjtJoint.mjJNT_SLIDE if is_slide else mujoco.mjtJoint.mjJNT_HINGE
-        if kind != expected:
-            raise InputError(
-                f"Joint {name!r} of the scene is of type {mujoco.mjtJoint(kind).name}, but joint "
-                f"{own!r} of {robot.name} needs {expected.name}."
-            )
+    if missing := [name for name in names if name not in known]:
+        hint = "If they have other names, pass joint_names=[…] in the order of robot.joint_names."
+        raise unknown_name("joint of the scene", missing[0], filter(None, known), hint)
     return [known[name] for name in names]
 
 
