@@ -31,15 +31,11 @@ def pose_question(state: State) -> str:
         float(upright @ each.frame_pose("base").rotation[2])
         for each in (state, state.replace(q=rearranged))
     ]
-    if cosines[0] < _TILTED < _UPRIGHT < cosines[1]:
-        return (
-            "Is the quaternion in q in the order w x y z, as in MuJoCo? Then the base would be "
-            "upright, but the order must be x y z w. floatbase.simulation.MujocoAdapter "
-            "converts MuJoCo's states."
-        )
-    if is_upright(state):
+    is_rearranged = cosines[0] < _TILTED < _UPRIGHT < cosines[1]
+    if is_upright(state) and not is_rearranged:
         return ""
     return (
-        "The robot is upside down, or its feet are above its centre of mass. Is the quaternion in "
-        "q in the order x y z w, and are the joints in the order of robot.joint_names?"
+        "The robot is upside down or on its side. Is its quaternion in the order w x y z, as in "
+        "MuJoCo? The order in q is x y z w; floatbase.simulation.MujocoAdapter converts states. "
+        "Are the joints in the order of robot.joint_names?"
     )

@@ -300,7 +300,7 @@ def _find_joints(robot: Robot, model: mujoco.MjModel, names: Sequence[str] | Non
 
 def _find_root(robot: Robot, model: mujoco.MjModel, joints: list[int]) -> int:
     """Return the body of the scene that carries the robot's tree, with a free joint if needed."""
-    free = free_joint(model, joints)
+    free = free_joint(model, joints)  # -1 if the root of the tree has no joint
     is_free = free >= 0 and model.jnt_type[free] == mujoco.mjtJoint.mjJNT_FREE
     if is_free != robot.is_floating:
         raise InputError(
