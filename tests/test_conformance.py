@@ -118,6 +118,7 @@ def right():
         "feasible_polygon.box": (-1.0, 1.0, -1.0, 1.0),
         "with_floating_base.robot": judges.load("ur5"),
         "load.name": "go2", "load_urdf.path": str(judges.load("ur5").urdf),
+        "MujocoAdapter.model": fb.Simulation(robot).model,
         "load_mjcf.path": str(Path(__file__).parent / "robots/hopper.xml"),
         "run_plots.friction_used.forces": record().measured, "block": "tau", "row": 0,
         **{f"{name}.qp": table_top() for name in ("feasible_polygon", "plot", "plot_optimum")},

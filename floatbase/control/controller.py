@@ -46,6 +46,7 @@ from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_n
 from floatbase.objectives import Task
 from floatbase.qp import QP, Solution, check_solver
 from floatbase.robots import Robot, State
+from floatbase.robots._upright import pose_question
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
@@ -446,7 +447,15 @@ class WholeBodyController:
             If the QP has no solution, unless `on_infeasible` is "soften".
         """
         in_loop = self._settings.backend != "reference"
-        command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
+        try:
+            command = self._answer(_Step(q, v, *self._checked_inputs(v, t, targets), in_loop, True))
+        except InfeasibleError as error:
+            if not (question := pose_question(State(self.robot, q))):
+                raise
+            found = error  # the message is searched for when it is read
+            raise InfeasibleError(
+                lambda: InfeasibleError(f"{found} {question}", found.constraints)
+            ) from None
         assert command is not None
         return command
 

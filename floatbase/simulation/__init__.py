@@ -2,6 +2,7 @@
 
 from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
+from floatbase.simulation.mujoco_adapter import MujocoAdapter
 from floatbase.simulation.observed import Latency, Observed, Observer, SensorNoise
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
@@ -13,6 +14,6 @@ from floatbase.simulation.sweep import sweep
 
 __all__ = [
     "ACTIVE_STATUSES", "Actuators", "Box", "Controller", "Ground", "Latency", "LiveSimulation",
-    "Observed", "Observer", "Push", "PushRecovery", "Rollout", "SensorNoise", "Simulation",
-    "push_recovery", "read_sweep", "rollout", "sweep",
+    "MujocoAdapter", "Observed", "Observer", "Push", "PushRecovery", "Rollout", "SensorNoise",
+    "Simulation", "push_recovery", "read_sweep", "rollout", "sweep",
 ]  # fmt: skip
