@@ -102,7 +102,7 @@ def right():
         "LiveSimulation": LiveSimulation(fb.Simulation(robot), standing, lambda record: None),
         "PerturbedSimulation": PerturbedSimulation(robot), "Challenge": CHALLENGES[0],
         "Affine": affine, "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
-        "fb.Rollout": record(), "items": picture, "Sequence[Picture]": [picture] * 2,
+        "fb.Rollout": record(), "Runs": record(), "items": picture, "Sequence[Picture]": [picture] * 2,
         "Sequence[Task]": standing.tasks, "Observer": lambda q, v, t: (q, v),
         "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": up, "npt.ArrayLike": up, "a": 10.0, "alpha": 0.1, "rate": 30.0, "omega": 5.0,
