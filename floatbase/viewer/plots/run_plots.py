@@ -69,12 +69,8 @@ def plot_run(rollout: Runs, select: Sequence[str] = ()) -> Figure:
     >>> from floatbase.viewer.plots import plot_run
     >>> figure = plot_run({"stiff": stiff, "soft": soft}, select=["com", "*_calf_joint"])
     """
-    runs, select = _as_runs(rollout), as_strings("select", select)
-    feet, joints = _matching(_feet(runs), select), _matching(_joints(runs), select)
-    for name in select:
-        if name not in _PLOTS and not _matching([*_feet(runs), *_joints(runs)], [name]):
-            known = [*_PLOTS, *_feet(runs), *_joints(runs)]
-            raise unknown_name("plot, contact or joint", name, known)
+    runs = _as_runs(rollout)
+    feet, joints = _selected(runs, select)
     shown = set(select) & set(_PLOTS)
     if feet and not shown & {"forces", "friction"}:
         shown |= {"forces", "friction"}
@@ -86,7 +82,7 @@ def plot_run(rollout: Runs, select: Sequence[str] = ()) -> Figure:
     figure.set_layout_engine("constrained")
     axes = grid[:, 0]
     for plot, axis in zip(plots, axes, strict=True):
-        plot(runs, axis, select)
+        plot(runs, axis, *([] if plot is plot_com else [select]))
         axis.label_outer()
     axes[0].set_title(
         ", ".join(f"{name or run.robot.name}: {run.outcome}" for name, run in runs.items())
@@ -94,7 +90,7 @@ def plot_run(rollout: Runs, select: Sequence[str] = ()) -> Figure:
     return figure
 
 
-def plot_com(rollout: Runs, axis: Axes | None = None, select: Sequence[str] = ()) -> Axes:
+def plot_com(rollout: Runs, axis: Axes | None = None) -> Axes:
     """Plot the displacement of the centre of mass since the start in x, y and z [mm].
 
     Parameters
@@ -103,8 +99,6 @@ def plot_com(rollout: Runs, axis: Axes | None = None, select: Sequence[str] = ()
         As for `plot_run`.
     axis : Axes, optional
         Axes to plot on. By default, a new figure.
-    select : sequence of str, optional
-        No effect.
 
     Returns
     -------
@@ -138,8 +132,9 @@ def plot_forces(rollout: Runs, axis: Axes | None = None, select: Sequence[str] =
     Axes
         The axes.
     """
-    runs, axis = _as_runs(rollout), _axes_or_new(axis)
-    for run, style, foot, colour, label in _curves_of_feet(runs, select):
+    runs = _as_runs(rollout)
+    feet, axis = _selected(runs, select)[0] or _feet(runs), _axes_or_new(axis)
+    for run, style, foot, colour, label in _curves_of_feet(runs, feet):
         normal = run.contacts.friction_contact(foot).normal
         if len(runs) == 1:
             planned = run.force(foot, "planned") @ normal
@@ -175,8 +170,9 @@ def plot_friction(rollout: Runs, axis: Axes | None = None, select: Sequence[str]
     -----
     [FBR]_, eq. (28).
     """
-    runs, axis = _as_runs(rollout), _axes_or_new(axis)
-    for run, style, foot, colour, label in _curves_of_feet(runs, select):
+    runs = _as_runs(rollout)
+    feet, axis = _selected(runs, select)[0] or _feet(runs), _axes_or_new(axis)
+    for run, style, foot, colour, label in _curves_of_feet(runs, feet):
         if len(runs) == 1:
             planned = _friction_of_foot(run, run.planned, foot)
             axis.plot(run.time, planned, color=colour, linewidth=4.0, alpha=0.3)
@@ -205,8 +201,8 @@ def plot_torques(rollout: Runs, axis: Axes | None = None, select: Sequence[str] 
     Axes
         The axes.
     """
-    runs, axis = _as_runs(rollout), _axes_or_new(axis)
-    chosen = _matching(_joints(runs), select) or _joints(runs)
+    runs = _as_runs(rollout)
+    chosen, axis = _selected(runs, select)[1] or _joints(runs), _axes_or_new(axis)
     shares = {name: _torque_shares(run, chosen) for name, run in runs.items()}
     peaks = {
         joint: max(
@@ -317,16 +313,23 @@ def _joints(runs: Mapping[str, Rollout]) -> list[str]:
     return list(dict.fromkeys(name for run in runs.values() for name in run.robot.joint_names))
 
 
-def _matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """Return the names that match one of the patterns."""
-    return [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
+def _selected(runs: Mapping[str, Rollout], select: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the contacts and joints that are selected, after checking the selection."""
+    found: tuple[list[str], list[str]] = ([], [])
+    known = _feet(runs), _joints(runs)
+    for pattern in as_strings("select", select):
+        matches = [[name for name in names if fnmatchcase(name, pattern)] for names in known]
+        if pattern not in _PLOTS and not any(matches):
+            raise unknown_name("plot, contact or joint", pattern, [*_PLOTS, *known[0], *known[1]])
+        for chosen, names in zip(found, matches, strict=True):
+            chosen += [name for name in names if name not in chosen]
+    return found
 
 
 def _curves_of_feet(
-    runs: Mapping[str, Rollout], select: Sequence[str]
+    runs: Mapping[str, Rollout], feet: Sequence[str]
 ) -> Iterator[tuple[Rollout, str, str, RGB, str]]:
-    """Yield record, style, name, colour and label of each chosen contact."""
-    feet = _matching(_feet(runs), select) or _feet(runs)
+    """Yield record, style, name, colour and label of each of the contacts."""
     labelled = set[str]()
     for run, style, _ in _styled(runs):
         for i, foot in enumerate(feet):
