@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from floatbase.simulation import Rollout
 
 Runs: TypeAlias = "Rollout | Mapping[str, Rollout]"
+Kind: TypeAlias = Literal["measured", "planned"]
 
 # fraction of the weight: the direction of a smaller force says nothing about friction
 _MIN_LOAD = 0.01
@@ -106,10 +107,10 @@ def plot_com(rollout: Runs, axis: Axes | None = None) -> Axes:
         The axes.
     """
     runs, axis = _as_runs(rollout), _axes_or_new(axis)
-    for run, style, is_first in _styled(runs):
+    for i, (run, style) in enumerate(_styled(runs)):
         moved = 1000.0 * (run.com - run.com[:1])
         for column, name, colour in zip(moved.T, "xyz", (X_AXIS, Y_AXIS, Z_AXIS), strict=True):
-            axis.plot(run.time, column, style, color=colour, label=name if is_first else "")
+            axis.plot(run.time, column, style, color=colour, label="" if i else name)
     return _finished(axis, runs, "displacement of the CoM [mm]")
 
 
@@ -120,12 +121,10 @@ def plot_forces(rollout: Runs, axis: Axes | None = None, select: Sequence[str] =
 
     Parameters
     ----------
-    rollout : Rollout, or mapping of str to Rollout
+    rollout, select
         As for `plot_run`.
     axis : Axes, optional
         Axes to plot on. By default, a new figure.
-    select : sequence of str, optional
-        Names of contacts, as for `plot_run`.
 
     Returns
     -------
@@ -134,14 +133,7 @@ def plot_forces(rollout: Runs, axis: Axes | None = None, select: Sequence[str] =
     """
     runs = _as_runs(rollout)
     feet, axis = _selected(runs, select)[0] or _feet(runs), _axes_or_new(axis)
-    for run, style, foot, colour, label in _curves_of_feet(runs, feet):
-        normal = run.contacts.friction_contact(foot).normal
-        if len(runs) == 1:
-            planned = run.force(foot, "planned") @ normal
-            axis.plot(run.time, planned, color=colour, linewidth=4.0, alpha=0.3)
-        axis.plot(run.time, run.force(foot) @ normal, style, color=colour, lw=1.2, label=label)
-    if len(runs) == 1:
-        axis.plot([], [], color=LIMIT, linewidth=4.0, alpha=0.5, label="planned")
+    _plot_feet(axis, runs, feet, _normal_force)
     return _finished(axis, runs, "normal forces [N]")
 
 
@@ -154,12 +146,10 @@ def plot_friction(rollout: Runs, axis: Axes | None = None, select: Sequence[str]
 
     Parameters
     ----------
-    rollout : Rollout, or mapping of str to Rollout
+    rollout, select
         As for `plot_run`.
     axis : Axes, optional
         Axes to plot on. By default, a new figure.
-    select : sequence of str, optional
-        Names of contacts, as for `plot_run`.
 
     Returns
     -------
@@ -172,12 +162,7 @@ def plot_friction(rollout: Runs, axis: Axes | None = None, select: Sequence[str]
     """
     runs = _as_runs(rollout)
     feet, axis = _selected(runs, select)[0] or _feet(runs), _axes_or_new(axis)
-    for run, style, foot, colour, label in _curves_of_feet(runs, feet):
-        if len(runs) == 1:
-            planned = _friction_of_foot(run, run.planned, foot)
-            axis.plot(run.time, planned, color=colour, linewidth=4.0, alpha=0.3)
-        used = _friction_of_foot(run, run.measured, foot)
-        axis.plot(run.time, used, style, color=colour, linewidth=1.2, label=label)
+    _plot_feet(axis, runs, feet, _friction_of_foot)
     axis.axhline(1.0, color=ALARM, linestyle="--", linewidth=1.0, label="cone")
     return _finished(axis, runs, "friction / (μ · normal force)")
 
@@ -189,12 +174,10 @@ def plot_torques(rollout: Runs, axis: Axes | None = None, select: Sequence[str] 
 
     Parameters
     ----------
-    rollout : Rollout, or mapping of str to Rollout
+    rollout, select
         As for `plot_run`.
     axis : Axes, optional
         Axes to plot on. By default, a new figure.
-    select : sequence of str, optional
-        Names of joints, as for `plot_run`.
 
     Returns
     -------
@@ -211,16 +194,16 @@ def plot_torques(rollout: Runs, axis: Axes | None = None, select: Sequence[str] 
         for joint in dict.fromkeys(joint for found in shares.values() for joint in found)
     }
     ranked = sorted(peaks, key=peaks.__getitem__, reverse=True)
-    named = [joint for joint in peaks if joint in ranked[: len(_COLOURS)]]
     others = ranked[len(_COLOURS) :]
-    for (run, style, is_first), found in zip(_styled(runs), shares.values(), strict=True):
-        for joint in others:
+    colours = dict(zip((joint for joint in peaks if joint not in others), _COLOURS, strict=False))
+    for joint in peaks:
+        look: dict[str, Any] = {"color": LIMIT, "linewidth": 0.6, "alpha": 0.5}
+        if joint in colours:
+            look = {"color": colours[joint], "linewidth": 1.2, "zorder": 3, "label": joint}
+        for (run, style), found in zip(_styled(runs), shares.values(), strict=True):
             if joint in found:
-                axis.plot(run.time, found[joint], style, color=LIMIT, linewidth=0.6, alpha=0.5)
-        for joint, colour in zip(named, _COLOURS, strict=False):
-            if joint in found:
-                label = joint if is_first else ""
-                axis.plot(run.time, found[joint], style, color=colour, lw=1.2, label=label)
+                axis.plot(run.time, found[joint], style, **look)
+                look.pop("label", None)
     if others:
         label = f"{len(others)} others, up to {100 * peaks[others[0]]:.0f} %"
         axis.plot([], [], color=LIMIT, linewidth=0.6, label=label)
@@ -296,10 +279,9 @@ def _as_runs(rollout: Runs) -> dict[str, Rollout]:
     }
 
 
-def _styled(runs: Mapping[str, Rollout]) -> Iterator[tuple[Rollout, str, bool]]:
-    """Yield each record with the style of its lines, and whether it is the first one."""
-    for run, style in zip(runs.values(), _STYLES, strict=False):
-        yield run, style, style == _STYLES[0]
+def _styled(runs: Mapping[str, Rollout]) -> list[tuple[Rollout, str]]:
+    """Return each record with the style of its lines."""
+    return list(zip(runs.values(), _STYLES, strict=False))
 
 
 def _feet(runs: Mapping[str, Rollout]) -> list[str]:
@@ -326,29 +308,39 @@ def _selected(runs: Mapping[str, Rollout], select: Sequence[str]) -> tuple[list[
     return found
 
 
-def _curves_of_feet(
-    runs: Mapping[str, Rollout], feet: Sequence[str]
-) -> Iterator[tuple[Rollout, str, str, RGB, str]]:
-    """Yield record, style, name, colour and label of each of the contacts."""
-    labelled = set[str]()
-    for run, style, _ in _styled(runs):
-        for i, foot in enumerate(feet):
-            if foot in run.contacts.names:
-                yield (
-                    run,
-                    style,
-                    foot,
-                    _COLOURS[i % len(_COLOURS)],
-                    "" if foot in labelled else foot,
-                )
-                labelled.add(foot)
+def _plot_feet(
+    axis: Axes,
+    runs: Mapping[str, Rollout],
+    feet: Sequence[str],
+    curve: Callable[[Rollout, str, Kind], Array],
+) -> None:
+    """Plot a curve of each contact, over a wider line for the planned one of a single record."""
+    for i, foot in enumerate(feet):
+        colour, label = _COLOURS[i % len(_COLOURS)], foot
+        for run, style in _styled(runs):
+            if foot not in run.contacts.names:
+                continue
+            if len(runs) == 1:
+                planned = curve(run, foot, "planned")
+                axis.plot(run.time, planned, color=colour, linewidth=4.0, alpha=0.3)
+            measured = curve(run, foot, "measured")
+            axis.plot(run.time, measured, style, color=colour, linewidth=1.2, label=label)
+            label = ""
+    if len(runs) == 1 and feet:
+        axis.plot([], [], color=LIMIT, linewidth=4.0, alpha=0.5, label="planned")
 
 
-def _friction_of_foot(run: Rollout, forces: Array, foot: str) -> Array:
+def _normal_force(run: Rollout, foot: str, kind: Kind) -> Array:
+    """Return the normal component of the force at a contact, shape (n,) [N]."""
+    return np.asarray(run.force(foot, kind) @ run.contacts.friction_contact(foot).normal)
+
+
+def _friction_of_foot(run: Rollout, foot: str, kind: Kind) -> Array:
     """Return the largest used fraction of friction among the points of a contact, shape (n,)."""
     points = run.contacts.only(foot).point_names
     rows = [run.contacts.point_names.index(point) for point in points]
-    return np.asarray(np.fmax.reduce(friction_used(run, forces)[rows]))
+    used = friction_used(run, run.measured if kind == "measured" else run.planned)
+    return np.asarray(np.fmax.reduce(used[rows]))
 
 
 def _torque_shares(run: Rollout, joints: Sequence[str]) -> dict[str, Array]:
@@ -366,7 +358,7 @@ def _finished(axis: Axes, runs: Mapping[str, Rollout], label: str) -> Axes:
     pushes = {(p.start, p.start + p.duration) for run in runs.values() for p in run.pushes}
     for i, (start, end) in enumerate(sorted(pushes)):
         axis.axvspan(start, end, color=PUSH, alpha=0.12, label="" if i else "push")
-    for (_, style, _), name in zip(_styled(runs), runs, strict=True):
+    for (_, style), name in zip(_styled(runs), runs, strict=True):
         if name:
             axis.plot([], [], style, color=GREYS[0], label=name)
     axis.set(xlabel="time [s]", ylabel=label)
