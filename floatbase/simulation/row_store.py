@@ -104,10 +104,9 @@ class RowStore:
             self._write(header)
             return
         found, rows = _read_rows(path, content)
-        for key in ("sweep", "parameters"):
-            if found[key] != header[key]:
-                there, here = (_described(one) for one in (found, header))
-                raise _wrong_file_error(path, f"holds a sweep of {there}, not of {here}")
+        there, here = _described(found), _described(header)
+        if there != here:
+            raise _wrong_file_error(path, f"holds a sweep of {there}, not of {here}")
         edited, present = 0, header["source"]  # "" if it is not known
         for i, point in enumerate(points):
             if same := rows.get(_key(point, header)):  # a point may be twice in the grid

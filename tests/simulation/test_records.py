@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,9 +13,9 @@ import judges
 import numpy as np
 import pandas as pd
 import pytest
-from messages import raises, warns
+from messages import raises, refused, warns
 from numpy.testing import assert_allclose, assert_array_equal
-from values import controller, record
+from values import record
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk
@@ -51,14 +52,12 @@ def test_a_loaded_run_has_the_same_robot(kind: str, tmp_path: Path) -> None:
     for name in ("joint_names", "frames", "package_dirs", "name"):
         assert getattr(loaded.robot, name) == getattr(run.robot, name)
     assert (loaded.robot.nominal is None) == (run.robot.nominal is None)
-    for made, saved in zip(loaded.robot.feet, run.robot.feet, strict=True):
-        assert made.frame == saved.frame and made.radius == saved.radius
-        assert_array_equal(made.points, saved.points)
     here, there = loaded.state(-1), run.state(-1)
     assert_allclose(here.M, there.M, atol=1e-12 * np.abs(there.M).max())
     assert_allclose(here.h, there.h, atol=1e-12 * np.abs(there.h).max())
     assert_array_equal(loaded.robot.torque_limits, run.robot.torque_limits)
-    fb.Simulation(loaded.robot)  # it compares the models of MuJoCo and Pinocchio
+    made, saved = fb.Simulation(loaded.robot), fb.Simulation(run.robot)
+    assert_array_equal(made.contact_positions(), saved.contact_positions())
 
 
 def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path) -> None:
@@ -123,8 +122,8 @@ def test_other_files_and_robots_are_refused(tmp_path: Path) -> None:
     with np.load(path) as stored:
         arrays = dict(stored)
     header = json.loads(str(arrays["header"]))
-    with raises(InputError, "run.npz", *judges.load("hyq").name.split()):
-        fb.Rollout.load(path, robot=judges.load("hyq"))
+    with raises(InputError, "run.npz", "ur5"):
+        fb.Rollout.load(path, robot=judges.load("ur5"))
     newer = json.dumps(header | {"format": "floatbase rollout 2"})
     for named, change in ((2, {"header": np.array(newer)}), ("damaged", {"header": np.zeros(3)})):
         np.savez(path, **arrays | change)
@@ -134,12 +133,9 @@ def test_other_files_and_robots_are_refused(tmp_path: Path) -> None:
         path.write_bytes(wrong)
         with raises(InputError, "run.npz"):
             fb.Rollout.load(path)
-    for odd in (str(tmp_path), "/dev/zero", 3):
-        with raises(InputError, odd):
-            fb.Rollout.load(odd)
-        if odd != "/dev/zero":
-            with raises(InputError, odd):
-                record().save(odd)
+    for odd in (tmp_path, tmp_path / "nowhere" / "run.npz", 3):
+        for call in (fb.Rollout.load, record().save):
+            refused(partial(call, odd), InputError, str(odd))
 
 
 def test_a_save_that_fails_leaves_the_former_file(tmp_path: Path, monkeypatch: Any) -> None:
@@ -178,7 +174,6 @@ def test_a_table_has_a_column_with_its_unit_for_everything(tmp_path: Path) -> No
         assert_array_equal(table[name], rows)
     table.to_csv(tmp_path / "run.csv", index=False)
     pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "run.csv"), table)
-    assert controller().robot == run.robot
 
 
 @pytest.mark.filterwarnings("ignore::floatbase.errors.RobotWarning")
@@ -189,9 +184,8 @@ def test_tables_have_soles_sliding_joints_wheels_and_empty_runs() -> None:
     assert_allclose(table[f"{foot} measured force z [N]"], table[corners].sum(axis=1))
     tiago = without_control(fb.load("tiago"))
     table = tiago.table()
-    assert_array_equal(table["torso_lift_joint torque [N]"], tiago.tau[:, [
-        tiago.robot.joint_names.index("torso_lift_joint")
-    ]].ravel())  # fmt: skip
+    lift = tiago.robot.joint_names.index("torso_lift_joint")
+    assert_array_equal(table["torso_lift_joint torque [N]"], tiago.tau[:, lift])
     angle = table["wheel_left_joint position [rad]"].to_numpy()
     index = tiago.robot.model.joints[tiago.robot.model.getJointId("wheel_left_joint")].idx_q
     assert_allclose(np.cos(angle), tiago.q[:, index], atol=1e-12)
