@@ -51,6 +51,7 @@ def test_a_loaded_run_has_the_same_robot(kind: str, tmp_path: Path) -> None:
     loaded = reloaded(run, tmp_path)
     for name in ("joint_names", "frames", "package_dirs", "name"):
         assert getattr(loaded.robot, name) == getattr(run.robot, name)
+    assert loaded.robot.has_joints_of(run.robot)  # states and controllers fit both
     assert (loaded.robot.nominal is None) == (run.robot.nominal is None)
     here, there = loaded.state(-1), run.state(-1)
     assert_allclose(here.M, there.M, atol=1e-12 * np.abs(there.M).max())
