@@ -37,8 +37,9 @@ The z axis of the world points up. Twists and wrenches have the linear part firs
 part. Contact forces and their Jacobian J are in world axes at the contact points. So are A and b,
 except for a flat foot, whose rows refer to the origin of its frame. `State.frame_velocity` is in
 world axes at the origin of the frame. The base velocity in v is the exception: it is in the base
-frame, as in Pinocchio. Quaternions are ordered x y z w. Rotation matrices map vectors from the
-frame to the world. Where the frame could be in doubt, the name gives it: `p_world`, `J_foot_world`.
+frame, as in Pinocchio. Quaternions are ordered x y z w. MuJoCo has other conventions, and
+`MujocoAdapter` converts them. Rotation matrices map vectors from the frame to the world. Where the
+frame could be in doubt, the name gives it: `p_world`, `J_foot_world`.
 
 Signs
 -----

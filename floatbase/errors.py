@@ -40,7 +40,7 @@ class RobotWarning(UserWarning):
 
 
 class SimulationWarning(UserWarning):
-    """A part of the input of a rollout or of a walk has no effect; the message says why."""
+    """An input of a simulation or a walk has no effect or does not fit; the message says why."""
 
 
 class InfeasibleError(FloatbaseError):

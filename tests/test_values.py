@@ -31,6 +31,7 @@ NO_VALUES = {
     "Simulation WholeBodyController",
     "a text": "ConstraintLabel",
     "memory of a thread or a window": "LiveSimulation SliderPanel Viewer",
+    "a link to MuJoCo, with tests of its own": "MujocoAdapter",
     "an answer that rollout copies": "TorqueCommand",
     "with a memory of what they do": "Jump Latency MPC Observed Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",

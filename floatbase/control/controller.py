@@ -40,6 +40,7 @@ from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_n
 from floatbase.objectives import Task
 from floatbase.qp import QP, check_solver
 from floatbase.robots import Robot, State
+from floatbase.robots._upright import pose_question
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
@@ -430,7 +431,15 @@ class WholeBodyController:
             If the reference backend finds neither a solution nor a conflict within its limit.
         """
         in_loop = self._settings.backend != "reference"
-        command = self._answer(self._checked_step(q, v, t, targets), True, in_loop)
+        try:
+            command = self._answer(self._checked_step(q, v, t, targets), True, in_loop)
+        except InfeasibleError as error:
+            if not (question := pose_question(State(self.robot, q))):
+                raise
+            found = error  # the message is searched for when it is read
+            raise InfeasibleError(
+                lambda: InfeasibleError(f"{found} {question}", found.constraints)
+            ) from None
         assert command is not None
         return command
 

@@ -376,7 +376,10 @@ class Contacts(Value):
             raise InputError(
                 f"forces {got}, but {self!r} needs shape ({self.k},) or (n, {self.k}) [N]."
             )
-        return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
+        at_points = stacked[..., part].reshape(
+            *stacked.shape[:-1], (part.stop - part.start) // 3, 3
+        )
+        return read_only(at_points.sum(axis=-2))
 
     def friction_contact(self, name: str) -> FrictionContact:
         """Return a contact whose forces act at points.

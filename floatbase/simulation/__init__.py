@@ -3,6 +3,7 @@
 from floatbase.simulation.damping import joint_damping
 from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
+from floatbase.simulation.mujoco_adapter import MujocoAdapter
 from floatbase.simulation.observed import Latency, Observed, Observer, SensorNoise
 from floatbase.simulation.physics import FALLEN_COSINE, FALLEN_HEIGHT_FRACTION, Simulation
 from floatbase.simulation.push import Push
@@ -14,7 +15,7 @@ from floatbase.simulation.sweep import sweep
 
 __all__ = [
     "ACTIVE_STATUSES", "FALLEN_COSINE", "FALLEN_HEIGHT_FRACTION", "Actuators", "Box", "Controller",
-    "Ground", "Latency", "LiveSimulation", "Observed", "Observer", "Push", "PushRecovery",
-    "Rollout", "SensorNoise", "Simulation", "joint_damping", "push_recovery", "read_sweep",
-    "rollout", "sweep",
+    "Ground", "Latency", "LiveSimulation", "MujocoAdapter", "Observed", "Observer", "Push",
+    "PushRecovery", "Rollout", "SensorNoise", "Simulation", "joint_damping", "push_recovery",
+    "read_sweep", "rollout", "sweep",
 ]  # fmt: skip

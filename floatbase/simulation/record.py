@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +27,11 @@ from floatbase.robots import Robot, State
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
+from floatbase.simulation.record_files import read_record, write_record
+from floatbase.simulation.record_table import as_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
@@ -181,6 +187,72 @@ class Rollout(Value):
         for row, q in zip(com, self.q, strict=True):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
+
+    def table(self) -> DataFrame:
+        """Return the record as a table, with one row for each control step.
+
+        A column is named by its subject, its quantity, its component and its unit, as in "time
+        [s]", "base position x [m]", "FL_hip_joint torque [N·m]" and "FL_foot measured force z [N]".
+        Frames are those of `q`, `v` and the contact forces. Targets are in `targets` alone.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The table; unknown values are NaN.
+
+        Raises
+        ------
+        MissingDependencyError
+            If pandas is not installed.
+        """
+        return as_table(self)
+
+    def save(self, path: str | Path) -> None:
+        """Save the record as an npz file, which `load` reads.
+
+        The file holds the robot, too. `numpy.load` reads its arrays without floatbase.
+
+        Parameters
+        ----------
+        path : str or Path
+            Path of the file; an existing file is replaced.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+
+        Warns
+        -----
+        SimulationWarning
+            If a contact is user-defined or has functions of time, which files cannot hold.
+        """
+        write_record(path, self)
+
+    @staticmethod
+    def load(path: str | Path, robot: Robot | None = None) -> Rollout:
+        """Load a record that `save` has written.
+
+        Parameters
+        ----------
+        path : str or Path
+            Path of the file.
+        robot : Robot, optional
+            Robot with the joints of the recorded one, for example if its meshes have moved. By
+            default, the robot in the file.
+
+        Returns
+        -------
+        Rollout
+            The record. Linear constraints have no rows, since files hold no functions.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, is not a record, or has another version, or if the robot has
+            other joints.
+        """
+        return Rollout(**read_record(path, robot))
 
     def slip(self, include_rolling: bool = True) -> Array:
         """Compute the largest distance of each contact point from where its stance began.

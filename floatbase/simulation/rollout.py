@@ -39,7 +39,9 @@ class Controller(Protocol):
     The result has an attribute `tau`, shape (d,) [N·m], and optionally `forces`, shape (k,) [N], in
     the world frame. The controller itself may have an attribute `contacts` of type `Contacts`: the
     stance of its last result, which may change from one control step to the next. Without this
-    attribute, all feet are used.
+    attribute, all feet are used. If it has a method `measure(tau, forces)`, `rollout` calls it
+    before each control step with the measurements of the last timestep: the motors' torques, shape
+    (d,) [N·m], and the forces on `sim.point_names`, shape (points, 3), in the world frame [N].
     """
 
     def __call__(self, q: Array, v: Array, t: float) -> Any:
@@ -169,11 +171,14 @@ def rollout(
         from tqdm.auto import tqdm  # slow to load
 
         bar = tqdm(bar, "rollout", unit=" ticks")
+    measure = getattr(controller, "measure", None)
     with sim.exclusive():
         for _ in bar:
             t, q, v = sim.time, sim.q, sim.v
             record.before_tick(t, q, v)
             try:
+                if measure is not None:
+                    measure(sim.torques(), sim.contact_forces())
                 command = controller(q, v, t)
             except FloatbaseError as error:
                 return end("controller failed", error)

@@ -200,9 +200,9 @@ def test_moving_targets_see_the_simulations_clock(sim):
     seen = []
     target = sim.robot.standing().com
 
-    def path(t: float) -> np.ndarray:
+    def path(t: float) -> tuple[np.ndarray, ...]:
         seen.append(t)
-        return target + np.array([0.0, 0.05 * t, 0.0])
+        return target + [0.0, 0.05 * t, 0.0], np.array([0.0, 0.05, 0.0]), np.zeros(3)
 
     robot = sim.robot
     tasks = [fb.CoMTask(path), fb.OrientationTask(), fb.PostureTask(robot.standing().q)]
