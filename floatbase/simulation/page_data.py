@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from floatbase.robots import Robot
-from floatbase.simulation.build import build_spec
+from floatbase.simulation.build import Extra, build_spec
 from floatbase.simulation.ground import Ground
 
 # fields of MuJoCo's model that its XML file rounds to six digits. Meshes are left out: only the
@@ -17,10 +17,10 @@ _ROUNDED_FIELDS = ("actuator_", "body_", "dof_", "geom_", "jnt_")
 
 
 def model_data(
-    robot: Robot, ground: Ground, timestep: float, losses: bool, model: mujoco.MjModel
+    robot: Robot, ground: Ground, timestep: float, losses: bool, extra: Extra, model: mujoco.MjModel
 ) -> dict[str, Any]:
     """Return a model as XML, and the fields that the XML does not store exactly."""
-    xml = build_spec(robot, ground, timestep, losses).to_xml()
+    xml = build_spec(robot, ground, timestep, losses, extra).to_xml()
     return {"xml": xml, "overrides": _lost_digits(model, xml)}
 
 

@@ -19,6 +19,7 @@ from floatbase.dynamics import (
     RollingWheel,
     fixed_frame,
     moving_frame,
+    rigid_between,
 )
 from floatbase.errors import InfeasibleError, InputError
 from floatbase.linear_algebra import null_space
@@ -424,6 +425,15 @@ def added_terms(robot: Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
         "soft contacts": (feet, {"contact_weight": 1e3, "inequalities": capture}),
         "fixed frame": (fb.Contacts([fixed_frame("base")]) + feet, {}),
         "driven frame": (drive + others, {"inequalities": capture}),
+        "connection": (fb.Contacts([rigid_between(first, robot.feet[1].frame)]), {}),
+        "moving ground": (
+            fb.Contacts.feet(robot, acceleration=lambda t: np.array([0.1, t, 0.2])),
+            {"inequalities": capture},
+        ),
+        "soft contacts on an accelerated ground": (
+            fb.Contacts.points(robot, acceleration=[1.0, 0.5, -0.2]),
+            {"contact_weight": 1e3},
+        ),
         "wheels": (fb.Contacts(wheels), {"inequalities": capture if len(wheels) > 2 else []}),
     }
 

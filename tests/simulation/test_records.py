@@ -93,7 +93,7 @@ def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path) -> None:
     )
     assert loaded.outcome == run.outcome and loaded.controller_off_time == run.controller_off_time
     assert_array_equal(loaded.joint_limits.lower, run.joint_limits.lower)
-    assert loaded.ground.height([1.5, 0.0]) == 0.1 and loaded.ground.mu == 0.8
+    assert loaded.ground.height([1.5, 0.0]) == 0.1 and loaded.ground.mus == [0.8]
 
 
 def test_constraints_keep_their_forces_and_lose_their_functions(tmp_path: Path) -> None:
