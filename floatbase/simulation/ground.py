@@ -143,13 +143,11 @@ class Ground(Value):
         acceleration: Acceleration = None,
     ):
         normals, offsets = as_half_spaces("the ground", normal, offset)
-        name, given = "mu of Ground", numeric_copy(mu)
-        if given is None or given.ndim == 0 or given.shape == (1,):
-            mus = np.full(len(normals), as_positive(name, mu))
-        else:
-            mus = as_array(name, mu, (len(normals),))
-            for i, each in enumerate(mus):
-                as_positive(f"{name} for plane {i}", each)
+        given = numeric_copy(mu)
+        shape = () if given is None or given.ndim == 0 else (len(normals),)
+        mus = np.broadcast_to(as_array("mu of Ground", mu, shape), len(normals))
+        for i, each in enumerate(mus):
+            as_positive(f"mu of Ground for plane {i}" if shape else "mu of Ground", each)
         vars(self).update(
             mus=read_only(mus),
             normals=normals,

@@ -23,7 +23,7 @@ from floatbase._validation import (
     cross,
     refuse_new_attributes,
 )
-from floatbase.dynamics import UP, Contacts, MotionConstraint
+from floatbase.dynamics import Contacts, MotionConstraint
 from floatbase.dynamics._compiled import acceleration_at
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
@@ -35,6 +35,7 @@ from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.page_data import model_data
 from floatbase.simulation.push import Push, as_pushes
+from floatbase.simulation.start import standing_on
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
 FALLEN_HEIGHT_FRACTION = 0.4
@@ -42,7 +43,6 @@ FALLEN_HEIGHT_FRACTION = 0.4
 FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
-_ROUNDING = 1e-9  # m: a foot on the ground may be this far below it
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 # after this warning of MuJoCo or a later one, its numbers are meaningless
 _FIRST_FATAL_WARNING = int(mujoco.mjtWarning.mjWARN_BADQPOS)
@@ -119,7 +119,7 @@ class Simulation:
         contacts = self._feet if contacts is None else as_instance("contacts", contacts, Contacts)
         extra = parts_of(self._feet, contacts)
         self._contacts = self._feet + extra
-        self._build_options = self.ground, self.timestep, self.joint_losses, extra.items
+        self._build_options = self.ground, self.timestep, self.joint_losses, tuple(extra)
         if self.ground.acceleration is not None and not robot.is_floating:
             raise InputError(
                 f"The ground accelerates, but {robot.name} has a fixed base, which is at rest. Use "
@@ -328,7 +328,11 @@ class Simulation:
         SimulationError
             If another thread is using the simulation.
         """
-        state = self._standing_state() if state is None else as_instance("state", state, State)
+        state = (
+            standing_on(self.robot, self.ground)
+            if state is None
+            else as_instance("state", state, State)
+        )
         if not self.robot.has_joints_of(state.robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
@@ -609,38 +613,6 @@ class Simulation:
         self.data.xfrc_applied[body, :3] += force
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
-    def _standing_state(self) -> State:
-        """Return the robot standing on the ground with all feet touching."""
-        robot, ground = self.robot, self.ground
-        planes: dict[str, Any] = {"normal": ground.normals, "offset": ground.offsets}
-        is_biped, is_single_plane = len(robot.feet) <= 2, len(self._planes) == 1
-        if not is_single_plane:
-            state = robot.standing(**planes)
-        elif robot.is_floating and is_biped and ground.normals[0, 2] < 1.0:
-            state = robot.standing(normal=ground.normals[0], balanced=True)
-            if robot.feet:  # where the tilted robot would have its feet
-                shift = np.mean(_foot_middles(self._tilted_state()) - _foot_middles(state), axis=0)
-                state = state.replace(q=np.concatenate([state.q[:3] + shift, state.q[3:]]))
-        else:
-            state = self._tilted_state()
-        if robot.is_floating and robot.feet and ground.boxes:
-            middles = _foot_middles(state)
-            clearances = middles[:, 2] - ground.height(middles[:, :2])
-            if np.any(clearances < np.array([foot.radius for foot in robot.feet]) - _ROUNDING):
-                return robot.standing(**planes, surface=ground.height, balanced=is_biped)
-        return state
-
-    def _tilted_state(self) -> State:
-        """Return the level standing state, tilted with the only plane of the ground."""
-        state = self.robot.standing()
-        if not self.robot.is_floating:
-            return state
-        normal, offset = self.ground.normals[0], self.ground.offsets[0]
-        rotation = pin.Quaternion.FromTwoVectors(np.array(UP), np.array(normal))
-        orientation = (rotation * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
-        position = rotation.matrix() @ state.q[:3] + offset * normal
-        return state.replace(q=np.concatenate([position, orientation.coeffs(), state.q[7:]]))
-
     def _base_height(self) -> float:
         """Return the height of the base's origin above the nearest plane of the ground [m].
 
@@ -654,11 +626,6 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
-
-
-def _foot_middles(state: State) -> Array:
-    """Return the middle of each foot's sole or ball, shape (feet, 3), world frame [m]."""
-    return np.array([state.point(foot.frame, foot.middle) for foot in state.robot.feet])
 
 
 def _dot(a: list[float], b: list[float]) -> float:

@@ -430,10 +430,6 @@ def added_terms(robot: Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
             fb.Contacts.feet(robot, acceleration=lambda t: np.array([0.1, t, 0.2])),
             {"inequalities": capture},
         ),
-        "soft contacts on an accelerated ground": (
-            fb.Contacts.points(robot, acceleration=[1.0, 0.5, -0.2]),
-            {"contact_weight": 1e3},
-        ),
         "wheels": (fb.Contacts(wheels), {"inequalities": capture if len(wheels) > 2 else []}),
     }
 
