@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._validation import Array, as_array, as_callable, cross
+from floatbase.errors import InputError
 from floatbase.robots import State
 
 # sine of the angle between axle and normal below which rounding decides the lowest point
@@ -56,6 +57,13 @@ class FrameConnection:
 
     def __call__(self, state: State, t: float) -> tuple[Array, Array]:
         """Return A and b of ġ = 0; g is the velocity of `frame` relative to the other body."""
+        robot = state.robot
+        ends = [robot.model.frames[robot.frame_id(name)] for name in (self.frame, self.other)]
+        if ends[0].parentJoint == ends[1].parentJoint:
+            raise InputError(
+                f"The frames {self.frame} and {self.other} belong to one link of {robot.name}. "
+                f"Name frames of two links."
+            )
         J, of_other = state.frame_jacobian(self.frame), state.frame_jacobian(self.other)
         arm = state.point(self.frame) - state.point(self.other)
         v, drift = state.frame_velocity(self.frame), state.frame_drift(self.frame)

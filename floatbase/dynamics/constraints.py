@@ -288,7 +288,8 @@ def rigid_between(frame: str, other: str) -> LinearConstraint:
     Raises
     ------
     InputError
-        If both names are the same.
+        If both names are the same, or, when A and b are computed, if both frames belong to one
+        link.
 
     Notes
     -----

@@ -54,6 +54,7 @@ class Connections:
         """Let the connections keep the poses of a state, which `data` is in."""
         for weld, contact in zip(self._welds, self.contacts, strict=True):
             pair, pose = (model.eq_obj1id[weld], model.eq_obj2id[weld]), model.eq_data[weld]
+            contact.constraint(state)  # raises an error if both frames belong to one link
             point = state.point(connected_frames(contact)[0])
             # the point in the second body and in the first one, then the second's orientation in
             # the first

@@ -78,6 +78,7 @@ def wheel(**wrong: object) -> RollingWheel:
         (lambda: PointContact("toe", acceleration=lambda: 0), "acceleration", "toe", "t"),
         (lambda: eom(fb.Contacts.points(GO2, acceleration=lambda t: np.zeros(2))), 2, 3),
         (lambda: rigid_between("base", "base"), "base"),
+        (lambda: eom(fb.Contacts([rigid_between("FL_calf", "FL_foot")])), "FL_calf", "FL_foot"),
         (lambda: wheel(axis=[0, 0, 0]), "axis", "disc"),
         (lambda: wheel(radius=0.0), "radius", "disc", 0),
         (lambda: wheel(mu=0.0), "mu", "disc", 0),
