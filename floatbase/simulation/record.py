@@ -95,7 +95,7 @@ class Rollout(Value):
         The ground of the simulation; None if it is not known.
     ground_position : ndarray, shape (n, 3), or None
         How far a ground with an acceleration has moved before the control step, in the world frame
-        [m]; None for a ground at rest.
+        [m]; None if it is not known.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -363,9 +363,7 @@ class Recorder:
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
         self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
         self._step_connection_forces = np.zeros((ticks * substeps, sim.connections.k))
-        self._ground_position: Array | None = None
-        if sim.ground.acceleration is not None:
-            self._ground_position = np.empty((ticks, 3))
+        self._ground_position = np.empty((ticks, 3))
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
         self._rows_with_plan: list[int] = []  # the rows that have planned forces
@@ -387,8 +385,7 @@ class Recorder:
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
         self._geom_rotations.take(geoms, 0, self._foot_rotations[n], "clip")
-        if self._ground_position is not None:
-            self._ground_position[n] = self._sim.ground_position
+        self._ground_position[n] = self._sim.ground_position
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
@@ -474,9 +471,7 @@ class Recorder:
             targets=MappingProxyType(self._targets_by_name()),
             joint_limits=self._joint_limits,
             ground=self._sim.ground,
-            ground_position=None
-            if self._ground_position is None
-            else self._complete_rows(self._ground_position),
+            ground_position=self._complete_rows(self._ground_position),
         )
 
     def _targets_by_name(self) -> dict[str, Array]:
@@ -528,8 +523,7 @@ class Recorder:
             sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
         )
         lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
-        if self._ground_position is not None:
-            lowest = lowest + self._ground_position[:n, None]
+        lowest = lowest + self._ground_position[:n, None]
         of_connections = self._mean_over_substeps(self._step_connection_forces[steps])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
