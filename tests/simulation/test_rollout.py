@@ -4,12 +4,18 @@ import judges
 import numpy as np
 import pytest
 from judges import Torques, limp
-from messages import missing, raises, refused
+from messages import missing, raises, refused, warns
 
 import floatbase as fb
 from floatbase.control import Command
 from floatbase.dynamics import fixed_frame
-from floatbase.errors import FloatbaseError, InfeasibleError, InputError, UnknownNameError
+from floatbase.errors import (
+    FloatbaseError,
+    InfeasibleError,
+    InputError,
+    SimulationWarning,
+    UnknownNameError,
+)
 from floatbase.robots import State, with_floating_base
 
 
