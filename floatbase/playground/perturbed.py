@@ -107,6 +107,7 @@ class PerturbedSimulation(Simulation):
             for name in ("body_mass", "body_inertia", "dof_armature")
         }
         self._nominal_gravity = np.array(model.opt.gravity)
+        self._nominal_friction = np.array(model.geom_friction[:, 0])
         self.perturbation = Perturbation() if perturbation is None else perturbation
 
     @property
@@ -123,9 +124,10 @@ class PerturbedSimulation(Simulation):
         model, self._perturbation = self.model, perturbation
         for name, nominal in self._nominal.items():
             getattr(model, name)[:] = perturbation.mass * nominal
-        model.opt.gravity[:] = perturbation.gravity * self._nominal_gravity
+        self._gravity = perturbation.gravity * self._nominal_gravity
+        model.opt.gravity[:] = self._gravity
         model.geom_friction[:, 0] = (
-            self.ground.mu if perturbation.friction is None else perturbation.friction
+            self._nominal_friction if perturbation.friction is None else perturbation.friction
         )
         for name, ball in zip(self.point_names, self.foot_contacts.geoms, strict=True):
             model.geom_conaffinity[ball] = name not in perturbation.disabled_contacts

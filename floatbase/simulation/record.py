@@ -93,6 +93,9 @@ class Rollout(Value):
         Joint limits in the last plan, as in `Command.joint_limits`.
     ground : Ground or None
         The ground of the simulation; None if it is not known.
+    ground_position : ndarray, shape (n, 3), or None
+        How far a ground with an acceleration has moved before the control step, in the world frame
+        [m]; None if it is not known.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -115,6 +118,7 @@ class Rollout(Value):
     targets: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
     joint_limits: JointLimits | None = None
     ground: Ground | None = None
+    ground_position: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -258,7 +262,7 @@ class Rollout(Value):
         """Compute the largest distance of each contact point from where its stance began.
 
         A point is in stance while the controller's contacts include it. Points that were never in
-        stance have 0.
+        stance have 0. The distance is that on the ground, which may itself move.
 
         Parameters
         ----------
@@ -273,6 +277,8 @@ class Rollout(Value):
         """
         self._check_not_empty()
         positions = self.foot_positions
+        if self.ground_position is not None:
+            positions = positions - self.ground_position[:, None]
         if not as_bool("include_rolling", include_rolling):
             positions = positions - self.rolling_displacement()
         max_distance, first = np.zeros(positions.shape[1]), 0
@@ -356,6 +362,8 @@ class Recorder:
         max_contacts = sim.foot_contacts.max_contacts
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
         self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
+        self._step_connection_forces = np.zeros((ticks * substeps, sim.connections.k))
+        self._ground_position = np.empty((ticks, 3))
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
         self._rows_with_plan: list[int] = []  # the rows that have planned forces
@@ -377,6 +385,7 @@ class Recorder:
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
         self._geom_rotations.take(geoms, 0, self._foot_rotations[n], "clip")
+        self._ground_position[n] = self._sim.ground_position
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
@@ -389,6 +398,8 @@ class Recorder:
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)] = geoms
         self._step_contact_forces[i, : forces.size] = forces
+        if self._step_connection_forces.size:
+            self._step_connection_forces[i] = self._sim.connection_forces()
         self._n_steps += 1
 
     def complete_tick(
@@ -460,6 +471,7 @@ class Recorder:
             targets=MappingProxyType(self._targets_by_name()),
             joint_limits=self._joint_limits,
             ground=self._sim.ground,
+            ground_position=self._complete_rows(self._ground_position),
         )
 
     def _targets_by_name(self) -> dict[str, Array]:
@@ -504,21 +516,26 @@ class Recorder:
         A point contact in the middle of a flat foot has the sum of the corners' forces and the mean
         of their positions.
         """
-        sim, n, feet = self._sim, self._n, self._sim.feet
+        sim, n, connections = self._sim, self._n, self._sim.connections
+        touching = sim.contacts.without(*connections.names)
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
             sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
         )
         lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
+        lowest = lowest + self._ground_position[:n, None]
+        of_connections = self._mean_over_substeps(self._step_connection_forces[steps])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
             forces = np.full((n, contact.k), np.nan)
             positions = np.full((n, len(point_names), 3), np.nan)
-            if contact.name in feet.names:
-                part = feet.force_slice(contact.name)
+            if contact.name in connections.names and contact.k == 6:
+                forces = of_connections[:, connections.force_slice(contact.name)]
+            elif contact.name in touching.names:
+                part = touching.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
-                if point_names == feet.only(contact.name).point_names:
+                if point_names == touching.only(contact.name).point_names:
                     forces, positions = measured[:, points].reshape(n, contact.k), lowest[:, points]
                 elif len(point_names) == 1:
                     forces = measured[:, points].sum(axis=1)

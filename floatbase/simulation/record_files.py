@@ -127,8 +127,8 @@ def _as_json(value: Any) -> Any:
     stored = {name: entry for name, entry in entries.items() if not callable(entry)}
     if known is not LinearConstraint and (len(stored) < len(entries) or type(value) is not known):
         warn(
-            f"A file cannot hold the functions of contact {value.name!r}. A loaded run treats it "
-            f"as a {known.__name__} at rest; its recorded forces are exact.",
+            f"A file cannot hold the functions of {getattr(value, 'name', 'the ground')}. A loaded "
+            f"run treats it as a {known.__name__} at rest; its recorded forces are exact.",
             SimulationWarning,
         )
     return {"class": known.__name__, **stored}

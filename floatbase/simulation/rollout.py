@@ -126,7 +126,8 @@ def rollout(
     Warns
     -----
     SimulationWarning
-        If pushes are given, but none acts during this rollout.
+        If pushes are given, but none acts during this rollout, or if the controller relies on a
+        contact or a constraint that the simulation does not have.
 
     Examples
     --------
@@ -157,7 +158,9 @@ def rollout(
     warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if warning:
         warn(warning, SimulationWarning)
-    record = Recorder(sim, _current_stance(sim, controller), ticks + settling_ticks, substeps)
+    stance = _current_stance(sim, controller)
+    record = Recorder(sim, stance, ticks + settling_ticks, substeps)
+    missing = _warn_of_missing(sim, stance, set())
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
         controller_off_time = sim.time
@@ -182,7 +185,9 @@ def rollout(
                 command = controller(q, v, t)
             except FloatbaseError as error:
                 return end("controller failed", error)
-            stance = _current_stance(sim, controller)
+            previous, stance = stance, _current_stance(sim, controller)
+            if stance is not previous:
+                missing = _warn_of_missing(sim, stance, missing)
             try:
                 desired = _desired_torques(sim, command)
                 planned = _planned_forces(command, stance)
@@ -278,6 +283,21 @@ def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
     """Return the controller's present contacts, or all feet if it has none."""
     contacts = getattr(controller, "contacts", None)
     return contacts if isinstance(contacts, Contacts) else sim.feet
+
+
+def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> set[str]:
+    """Warn of contacts that the simulation lacks; return them and the known ones."""
+    missing = {contact.name for contact in stance if not sim.has(contact)}
+    if missing - known:
+        warn(
+            f"The controller relies on {', '.join(sorted(missing - known))}, but the simulation "
+            f"has nothing there. Use fb.Simulation(robot, contacts=controller.contacts), which has "
+            f"points, flat feet and wheels at any frame, fixed frames and rigid connections; "
+            f"moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
+            f"controller.",
+            SimulationWarning,
+        )
+    return known | missing
 
 
 def _run_substeps(
