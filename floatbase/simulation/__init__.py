@@ -1,5 +1,6 @@
 """Simulation in MuJoCo, built from the same URDF and independent of the controller's code."""
 
+from floatbase.errors import explain_arguments
 from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
 from floatbase.simulation.mujoco_adapter import MujocoAdapter
@@ -17,3 +18,5 @@ __all__ = [
     "MujocoAdapter", "Observed", "Observer", "Push", "PushRecovery", "Rollout", "SensorNoise",
     "Simulation", "push_recovery", "read_sweep", "rollout", "sweep",
 ]  # fmt: skip
+
+explain_arguments(globals())

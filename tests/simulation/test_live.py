@@ -324,7 +324,7 @@ def test_a_second_thread_cannot_use_a_simulation_that_runs():
             except Exception as error:
                 refused.append(error)
 
-    with sim.exclusive():
+    with sim._exclusive():
         sim.step(np.zeros(12))  # the thread that has reserved it may use it
         thread = threading.Thread(target=use)
         thread.start()
