@@ -319,8 +319,8 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
     return len(found) == len(shape)
 
 
-def one_or_each(name: str, value: object, n: int, shape: tuple[int, ...]) -> Array:
-    """Return an array of this shape, for all of n states, or one for each state."""
+def one_or_each(name: str, value: object, n: int | None, shape: tuple[int, ...]) -> Array:
+    """Return an array of this shape, for all of n states, or one for each (None = any number)."""
     array = numeric_copy(value)
     for_each = array is not None and array.ndim > len(shape)
     return as_array(name, value, (n, *shape) if for_each else shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,11 @@ import numpy.typing as npt
 from floatbase._validation import (
     Array,
     Value,
+    as_array,
     as_instance,
     as_positive,
-    frozen,
+    checked,
     one_or_each,
-    read_only,
     short_repr,
 )
 from floatbase.errors import InputError
@@ -23,6 +23,13 @@ from floatbase.robots import Robot
 from floatbase.robots._checks import as_torque_limits
 
 _MAX_TIME = 10.0  # s, longest step: a longer one indicates a wrong unit
+
+
+def _as_gains(name: str, value: npt.ArrayLike, d: int | None = None) -> Array:
+    """Return one gain for all joints, or one for each, checked."""
+    gains = one_or_each(name, value, d, ())
+    as_positive(name, float(gains.min(initial=np.inf)), allow_zero=True, maximum=np.inf)
+    return gains
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +42,19 @@ class JointTargets(Value):
         Desired joint positions [rad or m].
     velocity : ndarray, shape (d,)
         Desired joint velocities [rad/s or m/s].
-    stiffness : float or ndarray, shape (d,)
+    stiffness : float or array_like, shape (d,)
         Stiffness [N·m/rad or N/m].
-    damping : float or ndarray, shape (d,)
+    damping : float or array_like, shape (d,)
         Damping [N·m·s/rad or N·s/m].
     torque : ndarray, shape (d,)
         Feedforward torques [N·m].
     """
 
-    position: Array
-    velocity: Array
-    stiffness: float | Array
-    damping: float | Array
-    torque: Array
+    position: Array = field(metadata=checked(as_array, (None,), "rad"))
+    velocity: Array = field(metadata=checked(as_array, (None,), "rad/s"))
+    stiffness: Array = field(metadata=checked(_as_gains))
+    damping: Array = field(metadata=checked(_as_gains))
+    torque: Array = field(metadata=checked(as_array, (None,), "N·m"))
 
     def torques(self, q_joints: Array, v_joints: Array) -> Array:
         """Return the torques of the driver, before its limits.
@@ -194,8 +201,11 @@ class JointServo:
         kept = np.exp(-self.leak * dt)
         lag = np.clip(kept * lag, -self._max_lag, self._max_lag)
         speed_error = np.clip(kept * speed_error, -self._max_speed_error, self._max_speed_error)
-        self._desired = frozen(q_joints + lag), frozen(v_joints + speed_error)
-        return JointTargets(*self._desired, self.stiffness, self.damping, torque)
+        targets = JointTargets(
+            q_joints + lag, v_joints + speed_error, self.stiffness, self.damping, torque
+        )
+        self._desired = targets.position, targets.velocity
+        return targets
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
         """Advance by a time step and return the torques of the drivers, within their limits.
@@ -218,11 +228,3 @@ class JointServo:
         """
         torques = self.targets(q_joints, v_joints, dt).torques(q_joints, v_joints)
         return np.clip(torques, -self.torque_limits, self.torque_limits)
-
-
-def _as_gains(name: str, value: npt.ArrayLike, d: int) -> Array:
-    """Return one gain for each joint, checked."""
-    gains = np.broadcast_to(one_or_each(name, value, d, ()), d)
-    for gain in gains.tolist():
-        as_positive(name, gain, allow_zero=True)
-    return read_only(gains)

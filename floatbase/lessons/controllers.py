@@ -138,7 +138,9 @@ def joint_servo(
         rate = (offset(t + _DIFFERENCE_STEP) - offset(t - _DIFFERENCE_STEP)) / (
             2.0 * _DIFFERENCE_STEP
         )
-        targets = JointTargets(offset(t), rate, stiffness, damping, holding_torques)
+        targets = JointTargets(
+            offset(t), rate, np.array(stiffness), np.array(damping), holding_torques
+        )
         return TorqueCommand(targets.torques(-state.difference(q)[joints], v[joints]))
 
     return controller
