@@ -165,7 +165,7 @@ class JointServo:
                 f"A JointServo needs planned accelerations, but {short_repr(command)} has no "
                 f"attribute qdd. Use a WholeBodyController or a Walk."
             )
-        self._plan = command.tau, command.qdd[-self.robot.d :]
+        self._plan = command.tau, command.qdd[self.robot.nv - self.robot.d :]
 
     def targets(self, q_joints: Array, v_joints: Array, dt: float) -> JointTargets:
         """Integrate the plan over a time step, and return what to send to the motor drivers.
@@ -187,13 +187,15 @@ class JointServo:
         Raises
         ------
         InputError
-            If no plan has been received, or if dt is not positive.
+            If no plan has been received, or if an argument is invalid.
         """
         if self._plan is None:
             raise InputError(
                 "The servo has no plan. Call servo.receive(command) after each control step."
             )
         dt = as_positive("dt", dt, "s", maximum=_MAX_TIME)
+        q_joints = as_array("q_joints", q_joints, (self.robot.d,), "rad")
+        v_joints = as_array("v_joints", v_joints, (self.robot.d,), "rad/s")
         torque, acceleration = self._plan
         position, velocity = self._desired or (q_joints, v_joints)
         lag = position + dt * velocity + 0.5 * dt**2 * acceleration - q_joints
