@@ -302,7 +302,7 @@ def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_arrays_of
 
 
 def test_joint_limits_that_do_not_fit_are_refused():
-    robot, limits = judges.load("go2"), limits_of(3, np.random.default_rng(0))
+    limits = limits_of(3, np.random.default_rng(0))
     with raises(InputError, "joint limits", "3", "12"):
         judges.controller_of("go2", joint_limits=limits)
     with raises(InputError, "joint_limits"):
