@@ -228,7 +228,7 @@ def worst_steps(n: int) -> Rows:
 def bare(sim: fb.Simulation, control: fb.WholeBodyController, duration: float) -> None:
     """Run a loop without checks, record and fall detection."""
     for _ in range(round(duration / sim.timestep)):
-        sim.advance(control(sim.q, sim.v, sim.time).tau)
+        sim._advance(control(sim.q, sim.v, sim.time).tau)
 
 
 def rollouts(turns: int) -> Rows:

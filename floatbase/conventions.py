@@ -52,7 +52,8 @@ The multiplier is the decrease of the optimal objective per unit increase of h.
 Units
 -----
 SI: m, rad, s, kg, N, N·m, W. Gains: kp 1/s², kd 1/s. Weights make squared residuals comparable;
-their units are 1/(m/s²)², 1/N² and 1/(N·m)².
+their units are 1/(m/s²)², 1/N² and 1/(N·m)². The weight of a soft constraint multiplies the
+violation itself, so its unit is 1/(rad/s²), 1/N or 1/(N·m).
 
 Immutable objects
 -----------------

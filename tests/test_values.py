@@ -33,7 +33,7 @@ NO_VALUES = {
     "memory of a thread or a window": "LiveSimulation SliderPanel Viewer",
     "a link to MuJoCo, with tests of its own": "MujocoAdapter",
     "an answer that rollout copies": "TorqueCommand",
-    "with a memory of what they do": "Jump Latency MPC Observed Stand StepPlan Walk",
+    "with a memory of what they do": "JointServo Jump Latency MPC Observed Stand StepPlan Walk",
     "with a memory of torques, copied below": "Delay FirstOrderLag",
     "shapes of a picture": "Item PictureOptions View",
     "made of functions of a lesson": "ConstantTorques MinimumCostController NumericJudge",

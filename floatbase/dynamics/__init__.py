@@ -42,6 +42,8 @@ from floatbase.dynamics.subspace import (
 )
 
 # fmt: off
+from floatbase.errors import explain_arguments
+
 __all__ = [
     "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts", "EquationsOfMotion",
     "FeasibleSpace", "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint",
@@ -52,3 +54,5 @@ __all__ = [
     "rigid_between", "torque_force_matrix", "torque_force_space", "undetermined_forces",
     "view_from_rotating_frame",
 ]  # fmt: skip
+
+explain_arguments(globals())

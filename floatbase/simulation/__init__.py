@@ -1,5 +1,6 @@
 """Simulation in MuJoCo, built from the same URDF and independent of the controller's code."""
 
+from floatbase.errors import explain_arguments
 from floatbase.simulation.damping import joint_damping
 from floatbase.simulation.ground import Box, Ground
 from floatbase.simulation.live import ACTIVE_STATUSES, LiveSimulation
@@ -19,3 +20,5 @@ __all__ = [
     "PushRecovery", "Rollout", "SensorNoise", "Simulation", "joint_damping", "push_recovery",
     "read_sweep", "rollout", "sweep",
 ]  # fmt: skip
+
+explain_arguments(globals())

@@ -336,7 +336,7 @@ class Simulation:
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."
             )
-        with self.exclusive():
+        with self._exclusive():
             self.link_collisions = False
             mujoco.mj_resetData(self.model, self.data)
             self._qpos[:], self._qvel[:] = self._conversion.to_mujoco(state.q, state.v)
@@ -352,19 +352,8 @@ class Simulation:
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
 
     @contextmanager
-    def exclusive(self) -> Iterator[None]:
-        """Reserve the simulation for the current thread, as a context manager.
-
-        Yields
-        ------
-        None
-            Nothing. The reservation ends with the context.
-
-        Raises
-        ------
-        SimulationError
-            If another thread is using the simulation.
-        """
+    def _exclusive(self) -> Iterator[None]:
+        """Reserve the simulation for the current thread, or raise `SimulationError`."""
         if not self._thread_lock.acquire(blocking=False):
             raise SimulationError(
                 "Another thread is using this simulation, for example a live run. Pause the run, "
@@ -403,21 +392,11 @@ class Simulation:
             If another thread is using the simulation.
         """
         torques, pushes = as_array("torques", tau, (self.robot.d,), "N·m"), as_pushes(pushes)
-        with self.exclusive():
-            self.advance(torques, pushes)
+        with self._exclusive():
+            self._advance(torques, pushes)
 
-    def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
-        """Advance by one timestep without the checks of `step`.
-
-        This method is meant for loops that have checked the torques.
-
-        Parameters
-        ----------
-        tau : ndarray, shape (d,)
-            Joint torques, float64 and finite, clipped to the motors' limits [N·m].
-        pushes : tuple of Push, optional
-            External forces; each acts during its own time.
-        """
+    def _advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
+        """Advance by one timestep without the checks of `step`; the torques are float64."""
         self.data.ctrl[self._actuator_ids] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:
@@ -442,21 +421,10 @@ class Simulation:
         ndarray, shape (d,)
             Joint torques [N·m].
         """
-        return self.torques_of(self.data.actuator_force)
+        return self._torques_of(self.data.actuator_force)
 
-    def torques_of(self, actuator_force: Array) -> Array:
-        """Convert MuJoCo's actuator forces to joint torques, without checks.
-
-        Parameters
-        ----------
-        actuator_force : ndarray, shape (..., d)
-            Forces of all actuators in MuJoCo's order [N·m].
-
-        Returns
-        -------
-        ndarray, shape (..., d)
-            Joint torques in the robot's order [N·m].
-        """
+    def _torques_of(self, actuator_force: Array) -> Array:
+        """Convert actuator forces of MuJoCo to joint torques, shape (..., d) [N·m]."""
         return actuator_force[..., self._actuator_ids]
 
     def contact_forces(self) -> Array:
@@ -467,38 +435,18 @@ class Simulation:
         ndarray, shape (points, 3)
             Force on each point of `point_names`, in the world frame [N].
         """
-        geoms, contact_frame_forces = self.read_contacts()
-        forces: Array = self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
+        geoms, contact_frame_forces = self._read_contacts()
+        forces: Array = self._contact_forces_of(geoms[None], contact_frame_forces[None])[0]
         return forces
 
-    def read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """Return the present contacts of the feet in MuJoCo's terms, for `contact_forces_of`.
-
-        Returns
-        -------
-        geoms : ndarray, shape (n, 2)
-            MuJoCo's ids of plane or box, and ball, of each contact.
-        contact_frame_forces : ndarray, shape (3 n,)
-            Forces [N]: on planes in the contact frames, normal component first, and on boxes in the
-            world frame.
-        """
+    def _read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
+        """Return the present contacts of the feet as `FootContacts.read` does."""
         return self.foot_contacts.read(self.model, self.data, self._link_collisions)
 
-    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Convert contacts that `read_contacts` returned at N instants to forces, without checks.
-
-        Parameters
-        ----------
-        geoms : ndarray, shape (N, n, 2)
-            MuJoCo's ids of plane or box, and ball; geom 0 stands for no contact.
-        contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces as from `read_contacts` [N].
-
-        Returns
-        -------
-        ndarray, shape (N, points, 3)
-            Force on each point of `point_names`, in the world frame [N].
-        """
+    def _contact_forces_of(
+        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
+    ) -> Array:
+        """Convert contacts of N instants to forces, shape (N, points, 3), world frame [N]."""
         return self.foot_contacts.forces(geoms, contact_frame_forces)
 
     def contact_positions(self) -> Array:

@@ -389,7 +389,7 @@ class Recorder:
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
-        i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
+        i, (geoms, forces) = self._n_steps, self._sim._read_contacts()
         missing = len(geoms) - self._step_contact_geoms.shape[1]
         if missing > 0:  # a foot touches many boxes
             more_geoms, more_forces = ((0, 0), (0, missing), (0, 0)), ((0, 0), (0, 3 * missing))
@@ -454,7 +454,7 @@ class Recorder:
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
             tau=self._mean_over_substeps(
-                self._sim.torques_of(self._step_actuator_forces[: self._n * self._substeps])
+                self._sim._torques_of(self._step_actuator_forces[: self._n * self._substeps])
             ),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
@@ -520,7 +520,9 @@ class Recorder:
         touching = sim.contacts.without(*connections.names)
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
-            sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
+            sim._contact_forces_of(
+                self._step_contact_geoms[steps], self._step_contact_forces[steps]
+            )
         )
         lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
         lowest = lowest + self._ground_position[:n, None]

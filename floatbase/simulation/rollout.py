@@ -49,7 +49,11 @@ class Controller(Protocol):
 
 
 class Actuators(Protocol):
-    """A model that converts desired torques into joint torques, and may have a state."""
+    """A model that converts desired torques into joint torques, and may have a state.
+
+    If it has a method `receive(command)`, as `JointServo` has, `rollout` calls it with the command
+    of each control step.
+    """
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
         """Return the torques of the next timestep.
@@ -99,9 +103,10 @@ def rollout(
         Time between two calls of the controller [s], a whole number of timesteps; by default one
         timestep.
     actuators : Actuators, optional
-        Model such as `HydraulicActuators` that converts the controller's torques in every timestep.
-        Without it, the joints get the controller's torques, within the motors' limits. The model's
-        state is kept from one rollout to the next, so reset the model together with the simulation.
+        Model such as `HydraulicActuators` or `JointServo` that converts the controller's torques in
+        every timestep. Without it, the joints get the controller's torques, within the motors'
+        limits. The model's state is kept from one rollout to the next, so reset the model together
+        with the simulation.
     settling_time : float, optional
         Time for which the simulation continues after a fall or a controller failure, so that the
         robot comes to lie on the ground [s]; a whole number of control periods. Meanwhile,
@@ -175,7 +180,8 @@ def rollout(
 
         bar = tqdm(bar, "rollout", unit=" ticks")
     measure = getattr(controller, "measure", None)
-    with sim.exclusive():
+    receive = getattr(actuators, "receive", None)
+    with sim._exclusive():
         for _ in bar:
             t, q, v = sim.time, sim.q, sim.v
             record.before_tick(t, q, v)
@@ -191,6 +197,8 @@ def rollout(
             try:
                 desired = _desired_torques(sim, command)
                 planned = _planned_forces(command, stance)
+                if receive is not None:
+                    receive(command)
                 _run_substeps(sim, desired, substeps, pushes, actuators, record)
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
@@ -316,7 +324,7 @@ def _run_substeps(
         if actuators is not None:
             tau = actuators.step(desired, *sim.joint_state, sim.timestep)
             tau = _as_torques(sim, "The actuators' torques", tau)
-        sim.advance(tau, pushes)
+        sim._advance(tau, pushes)
         record.after_step()
 
 
