@@ -115,7 +115,7 @@ def right():
         "support_margin.feet": np.eye(2), "time": (0.0, 0.1), "times": (0.0, 0.1),
         "duration": 0.002, "angles": lambda t: np.array([0.1 * t, 0.2 * t]),
         "acceleration": lambda t: up, "view_from_rotating_frame.omega": up,
-        "rigid_between.other": "RR_foot",
+        "rigid_between.other": "RR_foot", "JointServo.stiffness": 40.0, "JointServo.damping": 1.0,
         "nodding_rotation.rotation": np.eye(3), "cost": fb.Quadratic.zero(12),
         "Push.horizontal.force": 40.0, "Jump.height": 0.1,
         "feasible_polygon.box": (-1.0, 1.0, -1.0, 1.0),
@@ -215,7 +215,7 @@ def right_for(callee, parameter):
 
 def rights_of(callee):
     """Right arguments for all parameters that have no default."""
-    optional = ("file_options",)
+    optional = "file_options", "limits"
     required = [p for p in callee.parameters if p.default is p.empty and p.name not in optional]
     return {p.name: right_for(callee, p) for p in required}
 
