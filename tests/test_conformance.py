@@ -215,8 +215,11 @@ def right_for(callee, parameter):
 
 def rights_of(callee):
     """Right arguments for all parameters that have no default."""
-    optional = "file_options", "limits"
-    required = [p for p in callee.parameters if p.default is p.empty and p.name not in optional]
+    required = [
+        p
+        for p in callee.parameters
+        if p.default is p.empty and (p.kind is not p.VAR_KEYWORD or p.name == "ranges")
+    ]
     return {p.name: right_for(callee, p) for p in required}
 
 
