@@ -37,8 +37,9 @@ class Command(Value):
         Backend that computed the answer.
     solver : str
         Solver that found the answer: "compiled", or the solver of the reference backend. "daqp
-        unrefined" means that the last digits are lost. "level 1 of 3" means that the levels after
-        the first could not be solved within the limit of iterations.
+        unrefined" means that the constraints hold, but the optimum could not be confirmed: the
+        torques may be far from it. "level 1 of 3" means that the levels after the first could not
+        be solved within the limit of iterations.
     solution : Solution or callable
         Value of the property `solution`, or a function that computes it on first use.
     softened : tuple of str, optional

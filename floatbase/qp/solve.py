@@ -44,7 +44,7 @@ _PROXIMAL_WEIGHTS = -1e-2, -1e-6, 1e-5, 1e-4
 # DAQP's take some 20 ms for a humanoid, where it would otherwise cycle; the fallback's take 1.5 to
 # 4 s on a loaded machine, and it was never seen to need more than 155
 _DAQP_ITERATIONS, _FALLBACK_ITERATIONS = 1000, 300
-UNREFINED = "daqp unrefined"  # DAQP's result if its last digits cannot be improved
+UNREFINED = "daqp unrefined"  # DAQP's result if Newton steps do not confirm the optimum
 _WORK_PER_STEP = 1.6e7  # multiplications, some 3.5 ms
 
 
