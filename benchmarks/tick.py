@@ -22,6 +22,7 @@ from floatbase.dynamics import (
     RollingWheel,
     fixed_frame,
     moving_frame,
+    rigid_between,
 )
 from floatbase.objectives import (
     AngularMomentumTask,
@@ -155,6 +156,7 @@ def added_contacts(robot: fb.Robot) -> dict[str, fb.Contacts]:
     return {
         "fixed_frame": feet + fb.Contacts([fixed_frame(frame)]),
         "moving_frame": feet + fb.Contacts([moving_frame(frame, lambda t: np.zeros(3))]),
+        "rigid_between": feet + fb.Contacts([rigid_between(robot.feet[0].frame, frame)]),
         "RollingWheel": fb.Contacts(wheels),
     }
 
@@ -228,7 +230,7 @@ def worst_steps(n: int) -> Rows:
 def bare(sim: fb.Simulation, control: fb.WholeBodyController, duration: float) -> None:
     """Run a loop without checks, record and fall detection."""
     for _ in range(round(duration / sim.timestep)):
-        sim.advance(control(sim.q, sim.v, sim.time).tau)
+        sim._advance(control(sim.q, sim.v, sim.time).tau)
 
 
 def rollouts(turns: int) -> Rows:

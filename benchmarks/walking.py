@@ -296,7 +296,7 @@ def step_time(name: str, gait: Callable[[fb.Robot], Gait], impulse: float) -> Ro
         swinging.append(bool(walk.swings))
         softened += bool(command.softened)
         backends.add(command.backend)
-        sim.advance(command.tau, (push,))
+        sim._advance(command.tau, (push,))
     walks, bares = np.array(times["walk"]), np.array(times["bare"])
     calm = np.array(swinging) & (np.arange(len(walks)) < 2400)
     ratio, p99 = np.median(walks[calm]) / np.median(bares[calm]), np.percentile(walks, 99)

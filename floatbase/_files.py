@@ -10,6 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from typing import Any
+
+from floatbase.errors import InputError, short_repr
 
 # bytes: a text that people write, and a file that programs fill
 LARGEST_TEXT, LARGEST_DATA = 50_000_000, 1_000_000_000
@@ -75,3 +78,21 @@ def write_whole(path: Path, text: bytes, keep_link: bool = False) -> None:
     """Write a whole file or nothing; see `whole_file`."""
     with whole_file(path, keep_link) as part:
         part.write_bytes(text)
+
+
+@contextmanager
+def file_errors(argument: str, path: Any, example: str, what: str, advice: str) -> Iterator[None]:
+    """Raise `InputError` if the path does not name a file, or if the body cannot use the file."""
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f'{argument} must be a path, such as "{example}", not {short_repr(path)}.')
+    try:
+        yield
+    except InputError:
+        raise
+    except BlockingIOError:  # it is locked
+        raise InputError(
+            f"Another program is writing to {path}. Wait until it ends, or pass another file."
+        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path} {what}: {reason}. {advice}") from None

@@ -319,11 +319,15 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
     return len(found) == len(shape)
 
 
-def one_or_each(name: str, value: object, n: int, shape: tuple[int, ...]) -> Array:
-    """Return an array of this shape for each of n states; they may be equal, and given once."""
+def one_or_each(name: str, value: object, n: int | None, shape: tuple[int, ...]) -> Array:
+    """Return an array of this shape for each of n; they may be equal, and given once.
+
+    n: None for any number; a value that is given once is then returned once.
+    """
     array = numeric_copy(value)
     for_each = array is not None and array.ndim > len(shape)
-    return np.broadcast_to(as_array(name, value, (n, *shape) if for_each else shape), (n, *shape))
+    checked = as_array(name, value, (n, *shape) if for_each else shape)
+    return checked if n is None else np.broadcast_to(checked, (n, *shape))
 
 
 def as_forces(forces: Any, k: int | None, name: str = "forces") -> Array:

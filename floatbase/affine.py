@@ -23,7 +23,9 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.errors import InputError
+from floatbase.errors import InputError, explain_arguments
+
+__all__ = ["Affine", "Quadratic"]
 
 MAX_VARIABLES = 10_000  # a matrix with as many rows and columns takes 0.8 GB
 CURVATURE_TOLERANCE = 1e-12  # curvature below this fraction of the largest counts as zero
@@ -530,3 +532,6 @@ def as_blocks(blocks: Mapping[str, slice]) -> Mapping[str, slice]:
     raise InputError(
         f'blocks must map names to slices, as in {{"tau": slice(0, 12)}}, not {short_repr(blocks)}.'
     )
+
+
+explain_arguments(globals())

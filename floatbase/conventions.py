@@ -37,8 +37,9 @@ The z axis of the world points up. Twists and wrenches have the linear part firs
 part. Contact forces and their Jacobian J are in world axes at the contact points. So are A and b,
 except for a flat foot, whose rows refer to the origin of its frame. `State.frame_velocity` is in
 world axes at the origin of the frame. The base velocity in v is the exception: it is in the base
-frame, as in Pinocchio. Quaternions are ordered x y z w. Rotation matrices map vectors from the
-frame to the world. Where the frame could be in doubt, the name gives it: `p_world`, `J_foot_world`.
+frame, as in Pinocchio. Quaternions are ordered x y z w. MuJoCo has other conventions, and
+`MujocoAdapter` converts them. Rotation matrices map vectors from the frame to the world. Where the
+frame could be in doubt, the name gives it: `p_world`, `J_foot_world`.
 
 Signs
 -----
@@ -51,7 +52,8 @@ The multiplier is the decrease of the optimal objective per unit increase of h.
 Units
 -----
 SI: m, rad, s, kg, N, N·m, W. Gains: kp 1/s², kd 1/s. Weights make squared residuals comparable;
-their units are 1/(m/s²)², 1/N² and 1/(N·m)².
+their units are 1/(m/s²)², 1/N² and 1/(N·m)². The weight of a soft constraint multiplies the
+violation itself, so its unit is 1/(rad/s²), 1/N or 1/(N·m).
 
 Immutable objects
 -----------------

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from difflib import get_close_matches
+from functools import wraps
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -35,12 +36,16 @@ class UnknownNameError(FloatbaseError, KeyError):
         return str(self.args[0])
 
 
+class UnknownArgumentError(UnknownNameError, TypeError):
+    """A function or a constructor has no argument of this name; the message lists similar ones."""
+
+
 class RobotWarning(UserWarning):
     """A loaded robot lacks something that most uses require; the message says what."""
 
 
 class SimulationWarning(UserWarning):
-    """A part of the input of a rollout or of a walk has no effect; the message says why."""
+    """An input of a simulation or a walk has no effect or does not fit; the message says why."""
 
 
 class InfeasibleError(FloatbaseError):
@@ -171,6 +176,70 @@ def short_repr(value: object) -> str:
             text = " ".join(repr(value).split())
             return text if len(text) <= MAX_REPR else f"{text[:MAX_REPR]}…"
     return f"a value of type {type(value).__name__}"
+
+
+def explain_arguments(namespace: dict[str, Any], without: Collection[str] = ()) -> None:
+    """Let public functions and constructors of a package raise `UnknownArgumentError`.
+
+    Parameters
+    ----------
+    namespace : dict
+        Global variables of the package, with `__all__`.
+    without : collection of str, optional
+        Names to leave as they are.
+    """
+    for name in set(namespace["__all__"]).difference(without):
+        value = namespace.get(name)  # some are imported on first use
+        if inspect.isfunction(value):
+            namespace[name] = _explained(value)
+            namespace[name].__module__ = namespace["__name__"]  # where pickles look for it
+        elif inspect.isclass(value) and not getattr(value, "_is_protocol", False):
+            for member, method in list(vars(value).items()):
+                if member == "__init__" and inspect.isfunction(method):
+                    setattr(value, member, _explained(method))
+                elif isinstance(method, classmethod | staticmethod):
+                    setattr(value, member, type(method)(_explained(method.__func__)))
+
+
+def _explained(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that names unknown arguments, and is otherwise this function."""
+
+    @wraps(function)
+    def explained(*args: Any, **kwargs: Any) -> Any:
+        __tracebackhide__ = True  # IPython and pytest leave this line out of tracebacks
+        try:
+            return function(*args, **kwargs)
+        except TypeError as error:
+            if error.__traceback__ is None or error.__traceback__.tb_next is not None:
+                raise  # from within the function
+            known = set(inspect.signature(function).parameters) - {"self", "cls"}
+            check_arguments(function.__qualname__.removesuffix(".__init__"), kwargs, known)
+            raise  # a missing argument, or one too many
+
+    return explained
+
+
+def check_arguments(function: str, names: Iterable[str], known: Collection[str]) -> None:
+    """Raise `UnknownArgumentError` if a function does not have arguments of these names.
+
+    Parameters
+    ----------
+    function : str
+        Name of the function or class.
+    names : iterable of str
+        Names of the arguments.
+    known : collection of str
+        Names of the arguments that it has.
+
+    Raises
+    ------
+    UnknownArgumentError
+        If a name is not known.
+    """
+    for name in names:
+        if name not in known:
+            message = str(unknown_name(f"argument of {function}", name, known))
+            raise UnknownArgumentError(message) from None
 
 
 def unknown_name(kind: str, name: object, known: Iterable[str], hint: str = "") -> UnknownNameError:

@@ -100,8 +100,9 @@ def right():
         "LiveSimulation": LiveSimulation(fb.Simulation(robot), standing, lambda record: None),
         "PerturbedSimulation": PerturbedSimulation(robot), "Challenge": CHALLENGES[0],
         "Affine": affine, "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),
-        "fb.Rollout": record(), "items": picture, "Sequence[Picture]": [picture] * 2,
-        "Sequence[Task]": standing.tasks, "Observer": lambda q, v, t: (q, v),
+        "fb.Rollout": record(), "Runs": record(), "items": picture,
+        "Sequence[Picture]": [picture] * 2, "Sequence[Task]": standing.tasks,
+        "Observer": lambda q, v, t: (q, v),
         "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": up, "npt.ArrayLike": up, "a": 10.0, "alpha": 0.1, "rate": 30.0, "omega": 5.0,
         "N": np.eye(12)[:, :3],
@@ -113,12 +114,14 @@ def right():
         "points": contacts.positions(state), "places": np.zeros((2, 3)),
         "support_margin.feet": np.eye(2), "time": (0.0, 0.1), "times": (0.0, 0.1),
         "duration": 0.002, "angles": lambda t: np.array([0.1 * t, 0.2 * t]),
-        "moving_frame.acceleration": lambda t: up, "view_from_rotating_frame.omega": up,
+        "acceleration": lambda t: up, "view_from_rotating_frame.omega": up,
+        "rigid_between.other": "RR_foot", "JointServo.stiffness": 40.0, "JointServo.damping": 1.0,
         "nodding_rotation.rotation": np.eye(3), "cost": fb.Quadratic.zero(12),
         "Push.horizontal.force": 40.0, "Jump.height": 0.1,
         "feasible_polygon.box": (-1.0, 1.0, -1.0, 1.0),
         "with_floating_base.robot": judges.load("ur5"),
         "load.name": "go2", "load_urdf.path": str(judges.load("ur5").urdf),
+        "MujocoAdapter.model": fb.Simulation(robot).model,
         "load_mjcf.path": str(Path(__file__).parent / "robots/hopper.xml"),
         "run_plots.friction_used.forces": record().measured, "block": "tau", "row": 0,
         **{f"{name}.qp": table_top() for name in ("feasible_polygon", "plot", "plot_optimum")},
@@ -212,8 +215,11 @@ def right_for(callee, parameter):
 
 def rights_of(callee):
     """Right arguments for all parameters that have no default."""
-    optional = ("file_options",)
-    required = [p for p in callee.parameters if p.default is p.empty and p.name not in optional]
+    required = [
+        p
+        for p in callee.parameters
+        if p.default is p.empty and (p.kind is not p.VAR_KEYWORD or p.name == "ranges")
+    ]
     return {p.name: right_for(callee, p) for p in required}
 
 

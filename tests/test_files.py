@@ -161,6 +161,7 @@ KINDS = {
     [
         fb.load_urdf,
         read_sweep,
+        fb.Rollout.load,
         import_answers,
         grade_file,
         read_notebook,

@@ -152,7 +152,7 @@ SEARCHES = {
     "install": "Installation and troubleshooting",
     "jupyterhub": "Teaching with floatbase",
     "friction cone": "06 · Friction cones",
-    "infeasible": "Whole-body controller",
+    "infeasible": "Constraints and priorities",
     "custom task": "Whole-body controller",
     "urdf": "Your own robot",
     "humanoid": "Walking",

@@ -7,7 +7,7 @@ import judges
 import numpy as np
 
 import floatbase as fb
-from floatbase.actuators import HydraulicActuators
+from floatbase.actuators import HydraulicActuators, JointTargets
 from floatbase.behaviours import LIPM, Gains, Gait, HorizonQP, JumpPlan, Swing
 from floatbase.control import AnalyticController, JointLimits, LinearInequality
 from floatbase.dynamics import (
@@ -92,6 +92,7 @@ def values() -> dict[str, Any]:
         "Push": fb.Push([1.0, 0.0, 0.0]), "Ground": fb.Ground(),
         "Box": Box([0.0, 1.0], [0.0, 1.0], 0.1), "SensorNoise": SensorNoise(robot),
         "Hydraulics": hydraulic.cylinders.hydraulics,
+        "JointTargets": JointTargets(*np.ones((5, 12))),
         "HydraulicState": hydraulic.state, "CylinderGeometry": pose,
         "PowerBalance": hydraulic.cylinders.power(
             np.zeros(12), hydraulic.state.pressures, pose, np.zeros(12)

@@ -11,9 +11,13 @@ from floatbase.actuators.hydraulics import (
     Hydraulics,
     PowerBalance,
 )
+from floatbase.actuators.joint_servo import JointServo, JointTargets
 from floatbase.actuators.lags import Delay, FirstOrderLag
+from floatbase.errors import explain_arguments
 
 __all__ = [
     "VACUUM", "CylinderGeometry", "Cylinders", "Delay", "FirstOrderLag", "HydraulicActuators",
-    "HydraulicState", "Hydraulics", "PowerBalance",
+    "HydraulicState", "Hydraulics", "JointServo", "JointTargets", "PowerBalance",
 ]  # fmt: skip
+
+explain_arguments(globals())

@@ -19,6 +19,7 @@ from floatbase.behaviours.walk.options import Gains
 from floatbase.behaviours.walk.plan import WEIGHT_SHIFT_TIME, StepPlan
 from floatbase.behaviours.walk.swing import Swing, SwingPath
 from floatbase.behaviours.walk.walk import Walk
+from floatbase.errors import explain_arguments
 
 __all__ = [
     "LIPM", "MPC", "STATE_WEIGHTS", "WEIGHT_SHIFT_TIME", "CoMPlan", "Gains", "Gait",
@@ -26,3 +27,5 @@ __all__ = [
     "Terrain", "Walk", "capture_point", "neutral_point", "pitch_and_yaw", "raibert_foothold",
     "step_adjustment", "support_margin",
 ]  # fmt: skip
+
+explain_arguments(globals())

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
-from typing import Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -36,10 +36,11 @@ from floatbase.control.soft import (
 )
 from floatbase.control.tick import CompiledTick, TargetLayout, cache_warning, unsupported_reason
 from floatbase.dynamics import Contacts
-from floatbase.errors import InfeasibleError, InputError, SolverError, unknown_name
+from floatbase.errors import InfeasibleError, InputError, SolverError, check_arguments, unknown_name
 from floatbase.objectives import Task
 from floatbase.qp import QP, check_solver
 from floatbase.robots import Robot, State
+from floatbase.robots._upright import pose_question
 
 Backend: TypeAlias = Literal["auto", "compiled", "reference"]
 OnInfeasible: TypeAlias = Literal["raise", "soften"]
@@ -69,7 +70,8 @@ class WholeBodyController:
         Contacts of the robot with the ground.
     tasks : sequence of Task, or sequence of sequences of Task
         Tasks such as `fb.CoMTask`, or user-defined objects of the form of
-        `floatbase.objectives.Task`. Their weights decide between them. A list of lists sets strict
+        `floatbase.objectives.Task`. Their weights decide between them: the objective is the sum of
+        ½ weight ‖residual‖². A list of lists sets strict
         priorities instead: the first list has the highest priority, and each list is fulfilled as
         well as the lists before it allow. Only the reference backend supports priorities. If no
         task acts on forces, or none on torques, a `ForceTask` or a `TorqueTask` of small weight is
@@ -94,8 +96,10 @@ class WholeBodyController:
     joint_limits : JointLimits or {"robot"}, optional
         Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
         `JointLimits.of(robot, torque_limits=torque_limits)`, as soft constraints with a weight of
-        100: a limit yields only if torques, contacts or tasks of larger weight oppose it. None
-        switches them off.
+        100. This weight is not that of a task: a violation costs weight · violation, and the
+        residual of a task costs ½ weight · residual². A limit yields if torques or contacts oppose
+        it, or a task with a large residual, such as one whose target is far out of reach. None
+        switches the limits off.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation
         times this weight is added to the objective [1/N].
@@ -430,7 +434,15 @@ class WholeBodyController:
             If the reference backend finds neither a solution nor a conflict within its limit.
         """
         in_loop = self._settings.backend != "reference"
-        command = self._answer(self._checked_step(q, v, t, targets), True, in_loop)
+        try:
+            command = self._answer(self._checked_step(q, v, t, targets), True, in_loop)
+        except InfeasibleError as error:
+            if not (question := pose_question(State(self.robot, q))):
+                raise
+            found = error  # the message is searched for when it is read
+            raise InfeasibleError(
+                lambda: InfeasibleError(f"{found} {question}", found.constraints)
+            ) from None
         assert command is not None
         return command
 
@@ -625,12 +637,11 @@ class WholeBodyController:
         *,
         contacts: Contacts | None = None,
         tasks: Sequence[Task] | Sequence[Sequence[Task]] | None = None,
-        limits: Limits | None = None,
+        **limits: Any,
     ) -> WholeBodyController:
         """Return a controller with other contacts, tasks or limits and otherwise equal settings.
 
-        This method is fast enough to be called in the control loop. To change limits, pass for
-        example `dataclasses.replace(controller.limits, max_normal_force={"FL_foot": 0.0})`.
+        This method is fast enough to be called in the control loop.
 
         Parameters
         ----------
@@ -639,28 +650,39 @@ class WholeBodyController:
         tasks : sequence of Task, or sequence of sequences of Task, optional
             New tasks, or levels of tasks. To add to the attribute `tasks`, append a task to it, or
             a level to levels.
-        limits : Limits, optional
-            New limits.
+        **limits
+            New limits, as in the constructor: `torque_limits`, `joint_limits`, `facets`,
+            `inner_approximation`, `facet_rotation`, `min_normal_force`, `max_normal_force`,
+            `normal_force_weight` or `inequalities`. Each option that is not passed keeps its value.
+            That includes the braking acceleration of the joint limits if `torque_limits` changes.
 
         Returns
         -------
         WholeBodyController
             The new controller.
+
+        Raises
+        ------
+        UnknownArgumentError
+            If there is no such limit.
         """
+        now = {each.name: getattr(self.limits, each.name) for each in fields(Limits)}
+        check_arguments("WholeBodyController.replace", limits, ("contacts", "tasks", *now))
+        changed = Limits.of(self.robot, **(now | limits)) if limits else self.limits
         problem = replace(
             self._problem,
             contacts=self.contacts if contacts is None else contacts,
             tasks=self._problem.tasks if tasks is None else cast("Sequence[Task]", tasks),
             level_sizes=self._problem.level_sizes if tasks is None else (),
-            limits=self.limits if limits is None else limits,
+            limits=changed,
         )
         if (weight := contact_weight_of(self._problem.tasks)) is not None:
             problem = with_soft_contacts(problem, weight)
-        if limits is not None:
+        if limits:
             names = *problem.contacts.names, *self.contacts.names
-            limits.check_names(self.robot, names, before=self.limits)
+            changed.check_names(self.robot, names, before=self.limits)
         other = self._with_problem(problem)
-        compiled, has_changed = other._compiled, tasks is not None or limits is not None
+        compiled, has_changed = other._compiled, tasks is not None or bool(limits)
         if compiled is None:
             problem.check()
         elif has_changed or self.limits.inequalities or compiled.user_terms.any:

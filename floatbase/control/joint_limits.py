@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -29,7 +28,7 @@ from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s² or m/s²: ten times the weight of a task, so a limit outweighs a task. With a much
+# per rad/s² or m/s²: outweighs a task of weight 10 up to a residual of 10 m/s². With a much
 # larger weight, a supporting leg lets the robot fall rather than touch a joint's stop
 _WEIGHT = 100.0
 # fraction of a motor's acceleration in the standing posture that a joint can rely on for braking:
@@ -81,16 +80,6 @@ def _as_period(name: str, value: Any) -> float:
     return period
 
 
-def check_parameters(cls: Any, names: Iterable[str]) -> None:
-    """Raise `InputError` for a name that is not one of the fields of a dataclass."""
-    for name in names:
-        if name not in cls.__dataclass_fields__:
-            raise InputError(
-                f"{cls.__name__} has no parameter {name!r}. It has "
-                f"{', '.join(cls.__dataclass_fields__)}."
-            )
-
-
 def as_weight(name: str, value: Any) -> float | None:
     """Check and return the weight of a soft constraint, or None for a hard constraint."""
     return None if value is None else as_positive(name, value, maximum=_MAX_WEIGHT)
@@ -117,8 +106,11 @@ class JointLimits(Value):
         Control period [s]. The limits also hold for shorter periods.
     weight : float, optional
         Weight of a violation in the objective [units of the objective per rad/s² or m/s²]. The
-        limits hold as long as torques and contacts allow it. None makes the limits hard: if they
-        cannot hold, the QP has no solution.
+        penalty is linear: violation · weight. The cost of a task is quadratic, ½ weight ·
+        residual². A limit therefore yields to torques and contacts that oppose it, and to a task
+        whose weight · residual is larger than the limit's weight, such as a task of weight 10 with
+        a residual of more than 10 m/s². None makes the limits hard: if they cannot hold, the QP has
+        no solution.
 
     Raises
     ------
@@ -189,7 +181,6 @@ class JointLimits(Value):
             If an argument has a wrong type, shape or value.
         """
         limits = _limits_of(as_instance("robot", robot, Robot, 'fb.load("go2")'))
-        check_parameters(cls, changes)
         if torque_limits is not None:
             torques = as_torque_limits(robot.d, torque_limits)
             changes = {"braking": _braking(robot, torques), **changes}

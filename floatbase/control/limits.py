@@ -30,7 +30,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
-from floatbase.control.joint_limits import JointLimits, as_weight, check_parameters
+from floatbase.control.joint_limits import JointLimits, as_weight
 from floatbase.dynamics import Block, Contacts, EquationsOfMotion
 from floatbase.errors import InputError, unknown_name
 from floatbase.friction import FrictionPolyhedron
@@ -66,7 +66,8 @@ class LinearInequality(Value):
         One label for each row instead of its number, such as the names of joints.
     weight : float, optional
         None makes the inequalities hard. A number makes them soft: their violation times this
-        weight is added to the objective [units of the objective per unit of h].
+        weight is added to the objective [units of the objective per unit of h]. The weight of a
+        task multiplies the square of its residual instead.
 
     Raises
     ------
@@ -320,7 +321,6 @@ class Limits(Value):
             If an argument has a wrong type, shape or value.
         """
         as_instance("robot", robot, Robot, 'fb.load("go2")')
-        check_parameters(cls, options)
         torque_limits = robot.torque_limits if torque_limits is None else torque_limits
         torques = as_torque_limits(robot.d, torque_limits)
         if isinstance(joint_limits, str) and joint_limits == "robot":

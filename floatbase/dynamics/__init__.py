@@ -9,7 +9,13 @@ from floatbase.dynamics.constraint_rank import (
     contact_space,
     resolved_constraint,
 )
-from floatbase.dynamics.constraints import LinearConstraint, RollingWheel, fixed_frame, moving_frame
+from floatbase.dynamics.constraints import (
+    LinearConstraint,
+    RollingWheel,
+    fixed_frame,
+    moving_frame,
+    rigid_between,
+)
 from floatbase.dynamics.contact import (
     UP,
     FlatFootContact,
@@ -36,6 +42,8 @@ from floatbase.dynamics.subspace import (
 )
 
 # fmt: off
+from floatbase.errors import explain_arguments
+
 __all__ = [
     "CONSTRAINT_NOISE", "CONSTRAINT_RANK_TOLERANCE", "UP", "Block", "Contacts", "EquationsOfMotion",
     "FeasibleSpace", "FlatFootContact", "FrictionContact", "LinearConstraint", "MotionConstraint",
@@ -43,5 +51,8 @@ __all__ = [
     "constraint_and_jacobian", "contact_space", "coriolis_matrix", "delassus_matrix", "dimensions",
     "equations_of_motion", "feasible_space", "fixed_frame", "forces_from_torques", "grasp_matrix",
     "internal_forces", "motion_matrix", "moving_frame", "resolved_constraint",
-    "torque_force_matrix", "torque_force_space", "undetermined_forces", "view_from_rotating_frame",
+    "rigid_between", "torque_force_matrix", "torque_force_space", "undetermined_forces",
+    "view_from_rotating_frame",
 ]  # fmt: skip
+
+explain_arguments(globals())

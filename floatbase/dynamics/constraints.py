@@ -21,7 +21,13 @@ from floatbase._validation import (
     short_repr,
     unit_vector,
 )
-from floatbase.dynamics._compiled import MIN_TILT, FrameMotion
+from floatbase.dynamics._compiled import (
+    MIN_TILT,
+    Acceleration,
+    FrameConnection,
+    FrameMotion,
+    as_acceleration,
+)
 from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact
 from floatbase.errors import InputError
 from floatbase.robots import State
@@ -157,6 +163,8 @@ class RollingWheel(SinglePointContact):
         Coefficient of friction, dimensionless.
     centre : array_like, shape (3,), optional
         Centre of the wheel in the frame [m].
+    acceleration : array_like, shape (3,), or callable, optional
+        Acceleration of the ground, as for `PointContact`.
 
     Raises
     ------
@@ -231,16 +239,16 @@ def fixed_frame(frame: str) -> LinearConstraint:
     return LinearConstraint(f"bolts of {as_string('frame', frame)}", 6, FrameMotion(frame))
 
 
-def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearConstraint:
-    """Prescribe the acceleration of a frame's origin as a function of time.
+def moving_frame(frame: str, acceleration: Acceleration) -> LinearConstraint:
+    """Prescribe the acceleration of a frame's origin.
 
     Parameters
     ----------
     frame : str
         Name of the frame.
-    acceleration : callable
-        Called as `acceleration(t)` with the time t [s]. It returns the acceleration in the world
-        frame, shape (3,) [m/s²].
+    acceleration : array_like, shape (3,), or callable
+        Acceleration in the world frame [m/s²], constant or as a function `acceleration(t)` of the
+        time [s].
 
     Returns
     -------
@@ -251,6 +259,41 @@ def moving_frame(frame: str, acceleration: Callable[[float], Array]) -> LinearCo
     -----
     Note 6 of the course text.
     """
-    as_callable("acceleration", acceleration, "acceleration(t)")
-    function = FrameMotion(frame, acceleration)
+    if acceleration is None:
+        raise InputError("acceleration is None. Give an array or a function, or use fixed_frame.")
+    function = FrameMotion(frame, as_acceleration("acceleration", acceleration))
     return LinearConstraint(f"drive of {as_string('frame', frame)}", 3, function)
+
+
+def rigid_between(frame: str, other: str) -> LinearConstraint:
+    """Join two frames of the robot rigidly with six rows, as a box in two hands does.
+
+    The velocity g of `frame` relative to the body of `other` stays zero, and A q̈ = b is ġ = 0.
+
+    Parameters
+    ----------
+    frame : str
+        Name of the frame on which the multipliers act.
+    other : str
+        Name of the other frame, which receives the opposite wrench.
+
+    Returns
+    -------
+    LinearConstraint
+        The constraint "connection of …", whose λ consists of the force [N] and the moment [N·m] on
+        `frame` about its origin, in world axes.
+
+    Raises
+    ------
+    InputError
+        If both names are the same, or, when A and b are computed, if both frames belong to one
+        link.
+
+    Notes
+    -----
+    A kinematic loop, as in [FBR]_, eq. (5).
+    """
+    function = FrameConnection(as_string("frame", frame), as_string("other", other))
+    if frame == other:
+        raise InputError(f"Both frames are {frame!r}. Name two frames of different links.")
+    return LinearConstraint(f"connection of {frame} and {other}", 6, function)

@@ -21,6 +21,7 @@ from floatbase._validation import (
     short_repr,
     unit_vector,
 )
+from floatbase.dynamics._compiled import Acceleration, acceleration_at, as_acceleration
 from floatbase.robots import State
 from floatbase.robots._checks import as_corners
 
@@ -127,6 +128,9 @@ class SinglePointContact(Value):
     """
 
     frame: str = field(metadata=checked(as_string))
+    acceleration: Acceleration = field(
+        default=None, kw_only=True, metadata=checked(as_acceleration)
+    )
     k: ClassVar[int] = 3
     row_names: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # world-aligned
 
@@ -153,10 +157,10 @@ class SinglePointContact(Value):
         return self._jacobian(state, self._arm(state)[0])
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """Compute A = J and b = -J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm."""
+        """Compute A = J and b = a - J̇ q̇ of eq. (5), where J q̇ = v_frame + ω × arm."""
         (arm, arm_rate, omega), drift = self._arm(state), state.frame_drift(self.frame)
         b = -(drift[:3] + cross(drift[3:], arm) + cross(omega, arm_rate))
-        return self._jacobian(state, arm), frozen(b)
+        return self._jacobian(state, arm), frozen(b + acceleration_at(self.acceleration, t))
 
     def rolling_velocity(self, state: State) -> Array:
         """Compute how fast the contact point moves along the body, as a ball or a wheel rolls.
@@ -208,6 +212,9 @@ class PointContact(SinglePointContact):
         Radius of the ball [m]; 0 for a point of the body.
     centre : array_like, shape (3,), optional
         Centre of the ball in the frame [m].
+    acceleration : array_like, shape (3,), or callable, optional
+        Acceleration a of the ground in the world frame [m/s²], constant or as a function
+        `acceleration(t)` of the time [s]; then b = a - J̇ q̇. The ground must not turn.
     """
 
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
@@ -243,6 +250,8 @@ class FlatFootContact(Value):
         length.
     mu : float, optional
         Coefficient of friction, dimensionless.
+    acceleration : array_like, shape (3,), or callable, optional
+        Acceleration of the ground, as for `PointContact`.
 
     Notes
     -----
@@ -253,6 +262,9 @@ class FlatFootContact(Value):
     corners: Array
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))
     mu: float = field(default=DEFAULT_MU, metadata=checked(as_positive))
+    acceleration: Acceleration = field(
+        default=None, kw_only=True, metadata=checked(as_acceleration)
+    )
     # world-aligned
     row_names: ClassVar[tuple[str, ...]] = "x", "y", "z", "angular x", "angular y", "angular z"
 
@@ -329,14 +341,14 @@ class FlatFootContact(Value):
         return read_only(self.force_generator_matrix(state).T @ state.frame_jacobian(self.frame))
 
     def constraint(self, state: State, t: float = 0.0) -> tuple[Array, Array]:
-        """Compute A, the six rows of the frame's Jacobian, and b = -J̇ q̇.
+        """Compute A, the six rows of the frame's Jacobian, and b = -J̇ q̇, plus a in linear rows.
 
         Parameters
         ----------
         state : State
             State of the robot.
         t : float, optional
-            Time [s]; without effect here.
+            Time at which the ground's acceleration a is evaluated [s].
 
         Returns
         -------
@@ -349,7 +361,9 @@ class FlatFootContact(Value):
         -----
         [FBR]_, eq. (5).
         """
-        return state.frame_jacobian(self.frame), read_only(-state.frame_drift(self.frame))
+        b = -state.frame_drift(self.frame)
+        b[:3] += acceleration_at(self.acceleration, t)
+        return state.frame_jacobian(self.frame), frozen(b)
 
 
 def grasp_matrix(points: Array, reference_point: Array) -> Array:

@@ -22,6 +22,7 @@ from floatbase._validation import (
     read_only,
     short_repr,
 )
+from floatbase.dynamics._compiled import Acceleration
 from floatbase.dynamics.constraints import RollingWheel
 from floatbase.dynamics.contact import (
     DEFAULT_MU,
@@ -103,6 +104,7 @@ class Contacts(Value):
         mu: PerFoot = DEFAULT_MU,
         frames: Sequence[str] | None = None,
         normals: Normals = None,
+        acceleration: Acceleration = None,
     ) -> Contacts:
         """Make point contacts at the robot's feet or at other frames.
 
@@ -121,6 +123,9 @@ class Contacts(Value):
         normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
             Normals in the world frame, pointing out of the ground: one for all, one for each frame
             in order, or a mapping from frame names to shape (3,). The default is straight up.
+        acceleration : array_like, shape (3,), or callable, optional
+            Acceleration of the ground below all these contacts, in the world frame [m/s²]: constant
+            or a function `acceleration(t)` of the time [s].
 
         Returns
         -------
@@ -135,7 +140,7 @@ class Contacts(Value):
             If `frames`, `mu` or `normals` has a name that does not exist.
         """
         feet = _selected_feet(robot, frames, mu, normals)
-        return Contacts([_make_contact(*foot_data, flat=False) for foot_data in feet])
+        return Contacts([_make_contact(*foot_data, acceleration, flat=False) for foot_data in feet])
 
     @staticmethod
     def flat_feet(
@@ -143,6 +148,7 @@ class Contacts(Value):
         mu: PerFoot = DEFAULT_MU,
         frames: Sequence[str] | None = None,
         normals: Normals = None,
+        acceleration: Acceleration = None,
     ) -> Contacts:
         """Make flat-foot contacts, with forces at the corners of each foot.
 
@@ -156,6 +162,8 @@ class Contacts(Value):
             Names of the feet in contact; all feet by default.
         normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
             Normals in the world frame, pointing out of the ground, as for `points`.
+        acceleration : array_like, shape (3,), or callable, optional
+            Acceleration of the ground, as for `points`.
 
         Returns
         -------
@@ -175,10 +183,15 @@ class Contacts(Value):
                     "feet=[floatbase.robots.Foot(frame, corners=…)]"
                 )
                 raise InputError(f"{foot.frame} of {robot.name} is not a flat foot. {hint}.")
-        return Contacts([_make_contact(*foot_data) for foot_data in feet])
+        return Contacts([_make_contact(*foot_data, acceleration) for foot_data in feet])
 
     @staticmethod
-    def feet(robot: Robot, mu: PerFoot = DEFAULT_MU, normals: Normals = None) -> Contacts:
+    def feet(
+        robot: Robot,
+        mu: PerFoot = DEFAULT_MU,
+        normals: Normals = None,
+        acceleration: Acceleration = None,
+    ) -> Contacts:
         """Make contacts of all feet: flat feet with their corners, wheels that roll, and points.
 
         Parameters
@@ -189,6 +202,8 @@ class Contacts(Value):
             Coefficient of friction, dimensionless, as for `points`.
         normals : array_like of shape (3,) or (n, 3), or mapping of str to array_like, optional
             Normals in the world frame, pointing out of the ground, as for `points`.
+        acceleration : array_like, shape (3,), or callable, optional
+            Acceleration of the ground, as for `points`.
 
         Returns
         -------
@@ -209,7 +224,7 @@ class Contacts(Value):
                 f'fb.Contacts.points(robot, frames=["…"]). For free flight, use fb.Contacts.none().'
             )
         feet = _selected_feet(robot, None, mu, normals)
-        return Contacts([_make_contact(*foot_data) for foot_data in feet])
+        return Contacts([_make_contact(*foot_data, acceleration) for foot_data in feet])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -376,7 +391,10 @@ class Contacts(Value):
             raise InputError(
                 f"forces {got}, but {self!r} needs shape ({self.k},) or (n, {self.k}) [N]."
             )
-        return read_only(stacked[..., part].reshape(*stacked.shape[:-1], -1, 3).sum(axis=-2))
+        at_points = stacked[..., part].reshape(
+            *stacked.shape[:-1], (part.stop - part.start) // 3, 3
+        )
+        return read_only(at_points.sum(axis=-2))
 
     def friction_contact(self, name: str) -> FrictionContact:
         """Return a contact whose forces act at points.
@@ -500,13 +518,16 @@ def constraint_and_jacobian(
     return A, b, J
 
 
-def _make_contact(foot: Foot, mu: float, normal: Array, flat: bool = True) -> FrictionContact:
+def _make_contact(
+    foot: Foot, mu: float, normal: Array, acceleration: Acceleration, flat: bool = True
+) -> FrictionContact:
     """Make the contact of a foot: a wheel, a sole if `flat` is True, or else a point."""
+    moving = {"acceleration": acceleration}
     if foot.axis is not None:
-        return RollingWheel(foot.frame, foot.axis, foot.radius, normal, mu, foot.centre)
+        return RollingWheel(foot.frame, foot.axis, foot.radius, normal, mu, foot.centre, **moving)
     if flat and foot.is_flat:
-        return FlatFootContact(foot.frame, foot.points, normal, mu)
-    return PointContact(foot.frame, normal, mu, foot.radius, foot.middle)
+        return FlatFootContact(foot.frame, foot.points, normal, mu, **moving)
+    return PointContact(foot.frame, normal, mu, foot.radius, foot.middle, **moving)
 
 
 def _selected_feet(

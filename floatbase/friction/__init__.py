@@ -1,5 +1,6 @@
 """Friction cones, their polyhedral approximations, and the wrenches that a stance can produce."""
 
+from floatbase.errors import explain_arguments
 from floatbase.friction.cones import (
     Decomposition,
     FrictionCone,
@@ -15,3 +16,5 @@ __all__ = [
     "centre_of_pressure",
     "contact_wrench", "decompose", "tangents", "wrench_set",
 ]  # fmt: skip
+
+explain_arguments(globals())

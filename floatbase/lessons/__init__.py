@@ -4,7 +4,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from floatbase.errors import FloatbaseError
+from floatbase.errors import FloatbaseError, explain_arguments
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
 from floatbase.lessons.exercises import all_exercises, check, own_numbers, reveal, show_progress
@@ -69,6 +69,8 @@ __all__ = [
     "slider_samples",
     "static_export",
 ]  # fmt: skip
+
+explain_arguments(globals())
 
 
 def __getattr__(name: str) -> Any:

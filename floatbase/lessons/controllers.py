@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from floatbase._validation import Array, as_array, as_callable, as_instance, as_positive
+from floatbase.actuators import JointTargets
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts
 from floatbase.qp import QP
@@ -137,7 +138,9 @@ def joint_servo(
         rate = (offset(t + _DIFFERENCE_STEP) - offset(t - _DIFFERENCE_STEP)) / (
             2.0 * _DIFFERENCE_STEP
         )
-        error = -state.difference(q)[joints] - offset(t)
-        return TorqueCommand(holding_torques - stiffness * error - damping * (v[joints] - rate))
+        targets = JointTargets(
+            offset(t), rate, np.array(stiffness), np.array(damping), holding_torques
+        )
+        return TorqueCommand(targets.torques(-state.difference(q)[joints], v[joints]))
 
     return controller

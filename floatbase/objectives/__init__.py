@@ -3,6 +3,7 @@
 Section 3 of the course text.
 """
 
+from floatbase.errors import explain_arguments
 from floatbase.objectives._task import Task
 from floatbase.objectives.angular_momentum import AngularMomentumTask
 from floatbase.objectives.axis import AxisTask
@@ -49,3 +50,5 @@ __all__ = [
     "normal_bias", "partial_minimum", "standing_tasks", "tangential_bias", "torques_from_forces",
     "wrench_objective",
 ]  # fmt: skip
+
+explain_arguments(globals())

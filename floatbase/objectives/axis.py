@@ -96,6 +96,9 @@ class AxisTask(TargetTask):
     def _checked(self, target: Array, robot: Robot | None) -> Array:
         return unit_vector(f"direction of {self.name}", target)
 
+    def _displacement(self, start: Array, end: Array, robot: Robot) -> Array:
+        return _rotation_vector(start, end)
+
     def residual(self, eom: EquationsOfMotion, t: float = 0.0) -> Affine:
         """Compute the residual n × n̈ - P (d × d̈ - kp e - kd (n × ṅ - d × ḋ)).
 

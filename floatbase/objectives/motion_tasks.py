@@ -138,6 +138,10 @@ class OrientationTask(MotionTask):
     def _checked(self, target: Array, robot: Robot | None) -> Array:
         return nearest_rotation(self.name, target)
 
+    def _displacement(self, start: Array, end: Array, robot: Robot) -> Array:
+        displacement: Array = pin.log3(end @ start.T)
+        return displacement
+
     def _motion(self, state: State, x: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         e = pin.log3(state.frame_pose(self.frame).rotation @ x.T)
         J, drift = state.frame_jacobian(self.frame)[3:], state.frame_drift(self.frame)[3:]
@@ -233,6 +237,10 @@ class PostureTask(MotionTask):
             first_joint = 2 if robot.is_floating else 1
             check_unit_norms(robot.model, f"q of {self.name}", target, first_joint=first_joint)
         return target
+
+    def _displacement(self, start: Array, end: Array, robot: Robot) -> Array:
+        displacement: Array = pin.difference(robot.model, start, end)[robot.nv - robot.d :]
+        return displacement
 
     def _motion(self, state: State, x: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         d = state.robot.d

@@ -103,6 +103,10 @@ class RelativePoseTask(MotionTask):
         pose[3] = _LAST_ROW
         return frozen(pose)
 
+    def _displacement(self, start: Array, end: Array, robot: Robot) -> Array:
+        turn = pin.log3(end[:3, :3] @ start[:3, :3].T)
+        return np.concatenate([end[:3, 3] - start[:3, 3], turn])
+
     def _motion(self, state: State, x: Array, v: Array) -> tuple[Array, Array, Array, Array]:
         here, there = state.frame_pose(self.frame).copy(), state.frame_pose(self.reference)
         pose = there.actInv(here)

@@ -3,6 +3,7 @@
 The playground runs in a notebook or on a separate page.
 """
 
+from floatbase.errors import explain_arguments
 from floatbase.playground.build import nodding_rotation
 from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
 from floatbase.playground.equation import EQUATION, SYMBOLS, Term
@@ -36,3 +37,5 @@ __all__ = [
     "playground",
     "term_arrows",
 ]
+
+explain_arguments(globals())

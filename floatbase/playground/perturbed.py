@@ -107,6 +107,7 @@ class PerturbedSimulation(Simulation):
             for name in ("body_mass", "body_inertia", "dof_armature")
         }
         self._nominal_gravity = np.array(model.opt.gravity)
+        self._nominal_friction = np.array(model.geom_friction[:, 0])
         self.perturbation = Perturbation() if perturbation is None else perturbation
 
     @property
@@ -123,9 +124,10 @@ class PerturbedSimulation(Simulation):
         model, self._perturbation = self.model, perturbation
         for name, nominal in self._nominal.items():
             getattr(model, name)[:] = perturbation.mass * nominal
-        model.opt.gravity[:] = perturbation.gravity * self._nominal_gravity
+        self._gravity = perturbation.gravity * self._nominal_gravity
+        model.opt.gravity[:] = self._gravity
         model.geom_friction[:, 0] = (
-            self.ground.mu if perturbation.friction is None else perturbation.friction
+            self._nominal_friction if perturbation.friction is None else perturbation.friction
         )
         for name, ball in zip(self.point_names, self.foot_contacts.geoms, strict=True):
             model.geom_conaffinity[ball] = name not in perturbation.disabled_contacts
@@ -156,16 +158,8 @@ class PerturbedSimulation(Simulation):
         self._base_wrench = np.zeros(6)
         super().reset(state)
 
-    def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
-        """Advance one timestep as `Simulation.advance` does, with the perturbation's forces.
-
-        Parameters
-        ----------
-        tau : ndarray, shape (d,)
-            Joint torques [N·m].
-        pushes : tuple of Push, optional
-            Pushes that may act during the step.
-        """
+    def _advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
+        """Advance by one timestep, with the forces of the perturbation."""
         data, applied = self.data, self.data.qfrc_applied
         applied[:] = 0.0
         if not self._perturbation.velocity_forces:
@@ -178,7 +172,7 @@ class PerturbedSimulation(Simulation):
             # MuJoCo: linear in the world frame, angular in the base frame
             applied[:3] += R.reshape(3, 3) @ self._base_wrench[:3]
             applied[3:6] += self._base_wrench[3:]
-        super().advance(tau, pushes)
+        super()._advance(tau, pushes)
 
     def _velocity_compensation(self) -> Array:
         """Return generalized forces that cancel the velocity part of h, in MuJoCo coordinates."""
@@ -210,22 +204,11 @@ class PerturbedSimulation(Simulation):
                     self.model, self.data, force, np.zeros(3), position, body, applied
                 )
 
-    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Return contact forces as `Simulation.contact_forces_of` does, minus the adhesion force.
-
-        Parameters
-        ----------
-        geoms : ndarray, shape (N, n, 2)
-            Ground and foot geom of up to n contacts at N instants.
-        contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces in MuJoCo's contact frames [N].
-
-        Returns
-        -------
-        ndarray, shape (N, n_points, 3)
-            Forces of the ground on the contact points in the world frame [N].
-        """
-        forces = super().contact_forces_of(geoms, contact_frame_forces)
+    def _contact_forces_of(
+        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
+    ) -> Array:
+        """Convert contacts to forces as `Simulation` does, minus the adhesion force [N]."""
+        forces = super()._contact_forces_of(geoms, contact_frame_forces)
         if self._perturbation.adhesion_force:
             planes, foot_geoms = geoms[:, :, 0], geoms[:, :, 1]
             rows, columns = np.nonzero(np.isin(foot_geoms, self.foot_contacts.geoms))

@@ -3,6 +3,7 @@
 [FBR]_, §4 and App. C.
 """
 
+from floatbase.errors import explain_arguments
 from floatbase.qp.active_set import ActiveSetRun, Iteration, active_set
 from floatbase.qp.conflicts import FEASIBILITY_TOLERANCE, conflicting_constraints
 from floatbase.qp.labels import ConstraintLabel
@@ -16,3 +17,5 @@ __all__ = [
     "Residuals", "Solution", "active_set", "check_solver", "conflicting_constraints",
     "solve", "solvers",
 ]  # fmt: skip
+
+explain_arguments(globals())

@@ -3,6 +3,7 @@
 [FBR]_, §1 and §2.
 """
 
+from floatbase.errors import explain_arguments
 from floatbase.robots._checks import UNIT_NORM_TOLERANCE
 from floatbase.robots.floating import PLATE_SIZE, with_floating_base
 from floatbase.robots.loading import catalogue, load, load_mjcf, load_urdf
@@ -13,3 +14,5 @@ __all__ = [
     "PLATE_SIZE", "UNIT_NORM_TOLERANCE", "Foot", "Robot", "State", "catalogue",
     "load", "load_mjcf", "load_urdf", "with_floating_base",
 ]  # fmt: skip
+
+explain_arguments(globals())

@@ -475,11 +475,12 @@ def _reference_posture(model: pin.Model, loader: Any, root: Path, entry: Catalog
     q = pin.neutral(model)
     if loader.srdf_filename:
         srdf = str(root / loader.path / loader.srdf_subpath / loader.srdf_filename)
+        read = model.copy()  # so that the URDF and the rotor inertias are all that a robot is
         if loader.has_rotor_parameters:
-            pin.loadRotorParameters(model, srdf, False)
-            model.armature = model.rotorInertia * model.rotorGearRatio**2
-        pin.loadReferenceConfigurations(model, srdf, False)
-        postures = {found.key(): found.data() for found in model.referenceConfigurations}
+            pin.loadRotorParameters(read, srdf, False)
+            model.armature = read.rotorInertia * read.rotorGearRatio**2
+        pin.loadReferenceConfigurations(read, srdf, False)
+        postures = {found.key(): found.data() for found in read.referenceConfigurations}
         q = np.array(postures.get(loader.ref_posture, q))
     for joint, angle in entry.joints.items():
         q[model.idx_qs[model.getJointId(joint)]] = angle

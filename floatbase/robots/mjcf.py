@@ -21,12 +21,12 @@ import pinocchio as pin
 from floatbase._validation import Array
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots._checks import clamp_to_limits, has_floating_base
+from floatbase.robots._mujoco_motors import gear, largest_torque, motors_of
 from floatbase.robots.inertia import origin_attributes, shifted, text_of
 from floatbase.robots.urdf import parse_urdf, read_text
 
 _Joint, _Geom = mujoco.mjtJoint, mujoco.mjtGeom
 _JOINT_TYPES = {_Joint.mjJNT_HINGE: "revolute", _Joint.mjJNT_SLIDE: "prismatic"}
-_JOINT_TRANSMISSIONS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _LAST_VISIBLE_GROUP = 2  # MuJoCo's viewer hides geoms of the groups 3 to 5 at first
 _NO_COLOUR = [0.5, 0.5, 0.5, 1.0]  # MuJoCo's colour of a geom that has none
 _MESH_FILES = (".stl", ".obj", ".dae")
@@ -258,7 +258,8 @@ class _Writer:
         place = place * (pin.SE3(pin.exp3(back), np.zeros(3)) if is_hinge else shifted(back))
         lower, upper = model.jnt_range[joint] if limited else np.zeros(2)
         dof = model.jnt_dofadr[joint]
-        effort = text_of(self._largest_torque(joint))
+        torque = largest_torque(model, joint)
+        effort = text_of(torque if np.isfinite(torque) else 0.0)  # 0 if unlimited
         rest = (
             f"<axis xyz='{text_of(model.jnt_axis[joint])}'/><limit lower='{text_of(lower)}' "
             f"upper='{text_of(upper)}' effort='{effort}' velocity='0'/>"
@@ -342,45 +343,12 @@ class _Writer:
         qpos: Array = model.key_qpos[index] if names else model.qpos0
         return qpos
 
-    def _motors(self, joint: int) -> list[int]:
-        """Return the actuators of a joint."""
-        model = self._model
-        is_of_joint = model.actuator_trnid[:, 0] == joint
-        is_at_joints = np.isin(model.actuator_trntype, _JOINT_TRANSMISSIONS)
-        return list(np.flatnonzero(is_of_joint & is_at_joints))
-
-    def _gear(self, motors: int | list[int]) -> Array:
-        """Return the gear ratios of actuators of joints."""
-        gear: Array = self._model.actuator_gear[self._model.actuator_outadr[motors], 0]
-        return gear
-
     def with_motors(self, joint: int, quantity: str) -> float:
         """Return the armature [kg m² or kg] or the damping of a joint, with that of its motors."""
-        motors, of_joint = self._motors(joint), getattr(self._model, f"dof_{quantity}")
-        of_motors = self._gear(motors) ** 2 @ getattr(self._model, f"actuator_{quantity}")[motors]
-        return float(of_joint[self._model.jnt_dofadr[joint]] + of_motors)
-
-    def _largest_torque(self, joint: int) -> float:
-        """Return the torque or force that all actuators of a joint can apply; 0 if unlimited."""
-        model, motors = self._model, self._motors(joint)
-        torque = sum(map(self._largest_force, motors)) if motors else np.inf
-        if model.jnt_actfrclimited[joint]:
-            torque = min(torque, _magnitude(model.jnt_actfrcrange[joint]))
-        return float(torque) if np.isfinite(torque) else 0.0
-
-    def _largest_force(self, motor: int) -> float:
-        """Return the torque or force that an actuator can apply to its joint."""
-        model, force, control = self._model, np.inf, self._model.actuator_ctrladr[motor]
-        is_torque_motor = (
-            model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
-            and model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_NONE
-            and model.actuator_dyntype[motor] != mujoco.mjtDyn.mjDYN_INTEGRATOR
-        )
-        if is_torque_motor and model.actuator_ctrllimited[control]:
-            force = _magnitude(model.actuator_gainprm[motor, 0] * model.actuator_ctrlrange[control])
-        if model.actuator_forcelimited[motor]:
-            force = min(force, _magnitude(model.actuator_forcerange[motor]))
-        return float(force * abs(self._gear(motor)))
+        model, motors = self._model, motors_of(self._model, joint)
+        of_joint = getattr(model, f"dof_{quantity}")[model.jnt_dofadr[joint]]
+        of_motors = gear(model, motors) ** 2 @ getattr(model, f"actuator_{quantity}")[motors]
+        return float(of_joint + of_motors)
 
     def differences(self, missing: list[str]) -> list[str]:
         """Name everything that the robot does not have as in the file."""
@@ -400,7 +368,7 @@ class _Writer:
         constraints = list(self._couplings.values())
         coupled = {*self._couplings, *model.eq_obj2id[constraints].tolist()}  # they are locked
         driven = [i for i in self.joints if i not in coupled and model.nactuator]
-        passive = [i for i in driven if not self._motors(i)]
+        passive = [i for i in driven if not motors_of(model, i)]
         differences = {
             "without meshes whose file is missing": missing,
             "without equality constraints": self._labels(
@@ -421,12 +389,6 @@ class _Writer:
             for difference, parts in differences.items()
             if parts
         ]
-
-
-def _magnitude(limits: Array) -> float:
-    """Return the largest magnitude that both directions of a range allow."""
-    smallest, largest = sorted(map(float, np.abs(limits)))
-    return smallest if min(limits) < 0.0 < max(limits) else largest
 
 
 def _placement(position: npt.ArrayLike, wxyz: npt.ArrayLike) -> pin.SE3:

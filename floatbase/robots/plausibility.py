@@ -12,6 +12,7 @@ from floatbase.errors import InputError
 from floatbase.qp import QP, solve
 from floatbase.robots._checks import joint_limits
 from floatbase.robots._shapes import missing_meshes
+from floatbase.robots._upright import is_upright
 from floatbase.robots.feet import singular_legs
 from floatbase.robots.robot import Foot, Robot
 from floatbase.robots.state import State
@@ -147,13 +148,7 @@ def _units_message(robot: Robot, posture: State) -> str:
 
 def _upside_down_message(robot: Robot, posture: State) -> str:
     """Return a warning if the feet are above the centre of mass, or the base is turned over."""
-    if robot.feet:
-        feet = np.mean([posture.point(foot.frame, foot.middle) for foot in robot.feet], axis=0)
-        soles = [posture.frame_pose(foot.frame) for foot in robot.feet if foot.is_flat]
-        upright = feet[2] < posture.com[2] and all(sole.rotation[2, 2] > 0.0 for sole in soles)
-    else:
-        upright = posture.frame_pose("base").rotation[2, 2] > -0.5  # beyond 120° from upright
-    if upright:
+    if is_upright(posture):
         return ""
     return (
         f"{robot.name} is upside down in its posture, or its feet are not below its centre of "

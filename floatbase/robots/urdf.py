@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from floatbase._files import read_file
+from floatbase._files import file_errors, read_file
 from floatbase._validation import MAX_MAGNITUDE, Array, short_repr
 from floatbase.errors import InputError, RobotWarning, warn
 from floatbase.robots._checks import has_floating_base
@@ -71,14 +71,9 @@ _ROUNDING = 1e-12
 
 def read_text(path: Path) -> str:
     """Read the text of a URDF or MJCF file."""
-    try:
+    advice = "Pass the path of a URDF or MJCF file."
+    with file_errors("path", path.absolute(), "robot.urdf", "cannot be read", advice):
         data = read_file(path)
-    except (OSError, ValueError) as error:  # ValueError: the name contains a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            f"The file {path.absolute()} cannot be read ({reason}). Pass the path of a URDF or "
-            f"MJCF file."
-        ) from None
     encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     if declared := re.match(_OLD_ENCODING, data):
         encoding = declared[1].decode()

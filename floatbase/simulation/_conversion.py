@@ -2,10 +2,12 @@
 
 The package follows Pinocchio: quaternion x y z w, base velocity in the base frame, joints in
 Pinocchio's order. MuJoCo uses quaternion w x y z, the linear base velocity in the world frame, the
-angular base velocity in the base frame, and joints in the URDF's order.
+angular base velocity in the base frame, and joints in the order of its own file.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -18,23 +20,31 @@ from floatbase.robots import Robot, State
 class Conversion:
     """Map q and v of a robot to qpos and qvel of its MuJoCo model, and back."""
 
-    def __init__(self, robot: Robot, model: mujoco.MjModel):
-        self._robot = robot
+    def __init__(self, robot: Robot, model: mujoco.MjModel, joints: Sequence[int] | None = None):
+        """Find the free joint, and the joints in the order of τ, by default by their names."""
+        self._robot, self._sizes = robot, (model.nq, model.nv)
         self._n_base = 6 if robot.is_floating else 0
-        mujoco_ids = [model.joint(name).id for name in robot.joint_names]
+        if joints is None:
+            joints = [model.joint(name).id for name in robot.joint_names]
+        mujoco_ids = np.array(joints, dtype=int)
         self._qpos_indices = model.jnt_qposadr[mujoco_ids]
         self._qvel_indices = model.jnt_dofadr[mujoco_ids]
+        base = free_joint(model, joints) if self._n_base else 0
+        position, velocity = int(model.jnt_qposadr[base]), int(model.jnt_dofadr[base])
+        self._quaternion = slice(position + 3, position + 7)
+        self._linear_velocity = slice(velocity, velocity + 3)
         joint_ids = [robot.model.getJointId(name) for name in robot.joint_names]
         self._q_indices = np.array(robot.model.idx_qs)[joint_ids]
         # Pinocchio stores the angle of such a joint as (cos, sin)
         self._is_continuous = np.array(robot.model.nqs)[joint_ids] == 2
         self._cos_indices = self._q_indices[self._is_continuous]
-        base = [0, 1, 2, 4, 5, 6, 3] if self._n_base else []
         # index in qpos of each entry of q
-        self.qpos_of_q = np.array(base + [0] * (robot.nq - len(base)), dtype=int)
+        self.qpos_of_q = np.zeros(robot.nq, dtype=int)
+        if self._n_base:
+            self.qpos_of_q[:7] = position + np.array([0, 1, 2, 4, 5, 6, 3])
         self.qpos_of_q[self._q_indices] = self._qpos_indices
         self.qpos_of_q[self._cos_indices + 1] = self._qpos_indices[self._is_continuous]
-        self.qvel_of_v = np.concatenate([np.arange(self._n_base), self._qvel_indices])
+        self.qvel_of_v = np.append(velocity + np.arange(self._n_base), self._qvel_indices)
 
     def q(self, qpos: Array) -> Array:
         """Return q, shape (nq,), for MuJoCo's qpos."""
@@ -48,7 +58,8 @@ class Conversion:
         """Return v, shape (nv,), for MuJoCo's qpos and qvel."""
         v: Array = qvel[self.qvel_of_v]
         if self._n_base:
-            v[:3] = rotation_matrix(qpos[3:7]).T.dot(qvel[:3])
+            R = rotation_matrix(qpos[self._quaternion])
+            v[:3] = R.T.dot(qvel[self._linear_velocity])
         return v
 
     def joint_state(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
@@ -59,12 +70,12 @@ class Conversion:
         return qpos[self._qpos_indices], qvel[self._qvel_indices]
 
     def to_mujoco(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return MuJoCo's qpos and qvel for q and v."""
-        qpos, qvel = np.empty(self._robot.d + (7 if self._n_base else 0)), np.empty(self._robot.nv)
+        """Return MuJoCo's qpos and qvel for q and v, with zeros for other joints."""
+        qpos, qvel = np.zeros(self._sizes[0]), np.zeros(self._sizes[1])
+        qpos[self.qpos_of_q], qvel[self.qvel_of_v] = q, v
         if self._n_base:
-            qpos[:7] = q[[0, 1, 2, 6, 3, 4, 5]]
-            qvel[:3], qvel[3:6] = rotation_matrix(qpos[3:7]) @ v[:3], v[3:6]
-        qpos[self._qpos_indices], qvel[self._qvel_indices] = q[self._q_indices], v[self._n_base :]
+            R = rotation_matrix(qpos[self._quaternion])
+            qvel[self._linear_velocity] = R @ v[:3]
         qpos[self._qpos_indices[self._is_continuous]] = np.arctan2(
             q[self._cos_indices + 1], q[self._cos_indices]
         )
@@ -84,6 +95,11 @@ class Conversion:
         M = np.zeros((nv, nv))
         mujoco.mj_fullM(data.model, data, M)
         return T.T @ M @ T, T.T @ (data.qfrc_bias + M @ T_dot_v)
+
+
+def free_joint(model: mujoco.MjModel, joints: Sequence[int]) -> int:
+    """Return the first joint of the tree that has the joints, or of the model without joints."""
+    return int(model.body_jntadr[model.body_rootid[model.jnt_bodyid[joints[0]]]]) if joints else 0
 
 
 def rotation_matrix(wxyz: npt.ArrayLike) -> Array:

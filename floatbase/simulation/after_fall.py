@@ -31,7 +31,7 @@ def record_settling(
         record.before_tick(sim.time, sim.q, sim.v)
         tau = read_only(-damping * sim.joint_state[1])
         for _ in range(substeps):
-            sim.advance(tau, pushes)
+            sim._advance(tau, pushes)
             record.after_step()
         record.complete_tick(tau, stance, None)
         if sim.diverged:
@@ -44,7 +44,7 @@ def settling_rollout(
     """Record the next control steps after a record at whose end the controller is off."""
     stance = previous.contacts_at(-1) if len(previous) else previous.contacts
     record = Recorder(sim, stance, ticks, substeps)
-    with sim.exclusive():
+    with sim._exclusive():
         record_settling(sim, record, stance, ticks, substeps, pushes)
     return record.to_rollout(pushes, previous.outcome, previous.error, previous.controller_off_time)
 

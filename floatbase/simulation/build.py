@@ -11,17 +11,18 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 
-from floatbase.dynamics import Contacts
+from floatbase.dynamics import Contacts, FlatFootContact, MotionConstraint, RollingWheel
 from floatbase.errors import SimulationError
-from floatbase.robots import Foot, Robot
+from floatbase.robots import Robot
 from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.agreement import check_agreement
+from floatbase.simulation.connections import connected_frames
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.hulls import link_hulls
 
@@ -34,6 +35,7 @@ _IMPEDANCE_RATIO = 100.0
 _CONTACT_TIME_CONSTANT = 0.004
 # MuJoCo's default, but with 0.95 and 0.99 instead of 0.9 and 0.95: stiffer contacts
 _CONTACT_IMPEDANCE = 0.95, 0.99, 0.001, 0.5, 2.0
+_CONNECTION_IMPEDANCE = 0.999  # nearly rigid: two hands turn by 0.1 mrad under 5 N·m
 _IMPACT_TIME = 0.004  # s in which a link that hits the ground stops; four of the default timesteps
 # s in which a link comes out that was below the ground when collisions were switched on
 _PENETRATION_RECOVERY_TIME = 0.2
@@ -50,28 +52,34 @@ _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero
 # rounding
 _RELATIVE_ROUNDING = 1e-9
 
+# contacts that are not feet, and connections, as from `connections.parts_of`
+Extra: TypeAlias = tuple[MotionConstraint, ...]
 _JOINT_ATTRIBUTES = ("name", "type", "range", "limited", "actfrcrange", "actfrclimited")
 
 
-def build_model(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjModel:
+def build_model(
+    robot: Robot, ground: Ground, timestep: float, losses: bool, extra: Extra
+) -> mujoco.MjModel:
     """Build the MuJoCo model of a robot on the ground.
 
     The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
     and motors the names of the joints.
     """
     folders = robot.package_dirs
-    return copy.copy(_compiled_model(robot, folders, _ground_data(ground), timestep, losses))
+    return copy.copy(_compiled_model(robot, folders, _ground_data(ground), timestep, losses, extra))
 
 
-def build_spec(robot: Robot, ground: Ground, timestep: float, losses: bool) -> mujoco.MjSpec:
+def build_spec(
+    robot: Robot, ground: Ground, timestep: float, losses: bool, extra: Extra
+) -> mujoco.MjSpec:
     """Write the description from which `build_model` builds the model, from the same arguments."""
-    return _build_spec(robot, _ground_data(ground), timestep, losses)
+    return _build_spec(robot, _ground_data(ground), timestep, losses, extra)
 
 
 class _GroundData(NamedTuple):
     """The numbers of a ground that the model needs. Grounds with equal numbers are equal."""
 
-    mu: float
+    mus: tuple[float, ...]  # one for each plane
     planes: tuple[tuple[float, ...], ...]  # normal, offset
     boxes: tuple[tuple[float, ...], ...]  # both ends along x, both ends along y, top
 
@@ -80,20 +88,27 @@ def _ground_data(ground: Ground) -> _GroundData:
     """Return the numbers of a ground that the model needs."""
     planes = np.column_stack([ground.normals, ground.offsets])
     return _GroundData(
-        ground.mu, tuple(map(tuple, planes.tolist())), tuple(map(tuple, ground.box_bounds.tolist()))
+        tuple(ground.mus.tolist()),
+        tuple(map(tuple, planes.tolist())),
+        tuple(map(tuple, ground.box_bounds.tolist())),
     )
 
 
 @lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
 def _compiled_model(
-    robot: Robot, folders: tuple[Path, ...], ground: _GroundData, timestep: float, losses: bool
+    robot: Robot,
+    folders: tuple[Path, ...],
+    ground: _GroundData,
+    timestep: float,
+    losses: bool,
+    extra: Extra,
 ) -> mujoco.MjModel:
     """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it.
 
     Equal robots with meshes in other folders can have other hulls.
     """
     try:
-        model = _build_spec(robot, ground, timestep, losses).compile()
+        model = _build_spec(robot, ground, timestep, losses, extra).compile()
     except ValueError as error:
         raise SimulationError(
             f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
@@ -107,7 +122,9 @@ def _compiled_model(
     return model
 
 
-def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool) -> mujoco.MjSpec:
+def _build_spec(
+    robot: Robot, ground: _GroundData, timestep: float, losses: bool, extra: Extra
+) -> mujoco.MjSpec:
     """Write the description of a model."""
     spec = _spec_from_urdf(robot)
     spec.option.timestep = timestep
@@ -117,7 +134,7 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool
     contact = spec.default.geom
     # no torsional or rolling friction
     contact.condim = 3
-    contact.friction = [ground.mu, 0.0, 0.0]
+    contact.friction = [ground.mus[0], 0.0, 0.0]
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
@@ -132,20 +149,28 @@ def _build_spec(robot: Robot, ground: _GroundData, timestep: float, losses: bool
         motor.set_to_motor()
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
-    for *direction, offset in ground.planes:
+    for mu, (*direction, offset) in zip(ground.mus, ground.planes, strict=True):
         normal = np.array(direction)
         plane = spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal
         )
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
+        plane.friction[0] = mu
         mujoco.mju_quatZ2Vec(plane.quat, normal)
     for x0, x1, y0, y1, top in ground.boxes:
         box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
         centre = [x0 + half[0], y0 + half[1], top - half[2]]
         spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
-    for foot, contact_of_foot in zip(robot.feet, feet.friction_contacts, strict=True):
-        _add_foot_balls(spec, foot, contact_of_foot.point_names)
+    for part in (*feet, *extra):
+        if frames := connected_frames(part):
+            weld = spec.add_equality(name=part.name, type=mujoco.mjtEq.mjEQ_WELD)
+            weld.objtype, weld.data[10] = mujoco.mjtObj.mjOBJ_BODY, 1.0  # no scale of moments
+            weld.solref[:], weld.solimp[:2] = contact.solref, _CONNECTION_IMPEDANCE
+            weld.name1, weld.name2 = (_carrier(spec, robot, frame)[0].name for frame in frames)
+        else:
+            # of two coefficients of friction, MuJoCo takes the larger one, which is the plane's
+            _add_foot_balls(spec, robot, part, min(ground.mus))
     _add_link_hulls(spec, robot)
     return spec
 
@@ -266,24 +291,33 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     )
 
 
-def _add_foot_balls(spec: mujoco.MjSpec, foot: Foot, names: tuple[str, ...]) -> None:
+def _add_foot_balls(spec: mujoco.MjSpec, robot: Robot, contact: Any, mu: float) -> None:
     """Add a ball or a disc for each contact point of a foot; the point is its lowest one."""
-    body = spec.body(body_name(foot.frame))
-    if body is None:
-        raise SimulationError(
-            f"The foot {foot.frame} is not a link of the URDF. Give feet by the names of their "
-            f"links."
+    body, pose = _carrier(spec, robot, contact.frame)
+    if isinstance(contact, FlatFootContact):
+        # corners lie below the balls, along the z axis of the foot
+        centres, radius = contact.corners + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
+    else:
+        centres, radius = contact.centre[None], max(contact.radius, _MIN_BALL_RADIUS)
+    for name, centre in zip(contact.point_names, centres, strict=True):
+        geom = body.add_geom(  # a geom without a type is a sphere
+            name=name, size=[radius, 0.0, 0.0], mass=0.0, contype=0, conaffinity=1
         )
-    centres, radius = foot.points, max(foot.radius, _MIN_BALL_RADIUS)
-    if foot.is_flat:
-        centres, radius = centres + [0.0, 0.0, _CORNER_BALL_RADIUS], _CORNER_BALL_RADIUS
-    for name, centre in zip(names, centres, strict=True):  # a geom without a type is a sphere
-        geom = body.add_geom(
-            name=name, size=[radius, 0.0, 0.0], pos=centre, mass=0.0, contype=0, conaffinity=1
-        )
-        if foot.axis is not None:
+        geom.pos, geom.friction[0] = pose.act(centre), mu
+        if isinstance(contact, RollingWheel):
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [radius, radius, _RIM_WIDTH]
-            mujoco.mju_quatZ2Vec(geom.quat, np.array(foot.axis))
+            mujoco.mju_quatZ2Vec(geom.quat, pose.rotation @ contact.axis)
+
+
+def _carrier(spec: mujoco.MjSpec, robot: Robot, name: str) -> tuple[mujoco.MjsBody, pin.SE3]:
+    """Return the body that carries a frame of the robot, and the frame's pose in it."""
+    if body := spec.body(body_name(name)):
+        return body, pin.SE3.Identity()
+    frame = robot.model.frames[robot.frame_id(name)]
+    if frame.parentJoint == 0:
+        return spec.worldbody, frame.placement
+    joint = spec.joint(robot.model.names[frame.parentJoint])  # None for the free joint
+    return spec.body(body_name(robot.base)) if joint is None else joint.parent, frame.placement
 
 
 def _add_link_hulls(spec: mujoco.MjSpec, robot: Robot) -> None:

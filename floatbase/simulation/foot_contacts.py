@@ -34,9 +34,9 @@ class FootContacts:
         """Return the n contacts of the feet at this instant."""
         contact = data.contact
         forces = data.efc_force
-        n_limits = data.nl
-        if n_limits:  # the contacts follow the joints that are at their limits
-            forces = forces[n_limits:]
+        n_others = data.ne + data.nl
+        if n_others:  # the contacts follow connections and joints that are at their limits
+            forces = forces[n_others:]
         geoms = contact.geom  # from the plane to a ball or a link; a ball comes before a box
         if forces.size != 3 * len(geoms):
             # a ball that barely touches has no force; a cone other than ours has other sizes

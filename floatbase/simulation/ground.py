@@ -24,6 +24,7 @@ from floatbase._validation import (
     read_only,
 )
 from floatbase.dynamics import UP
+from floatbase.dynamics._compiled import Acceleration, as_acceleration
 from floatbase.errors import InputError
 
 _PLATFORM = 10.0  # m: length of the level parts before and after stairs or a gap
@@ -87,8 +88,9 @@ class Ground(Value):
 
     Parameters
     ----------
-    mu : float, optional
-        Coefficient of friction between the ground and the feet, positive [-].
+    mu : float or array_like, shape (n,), optional
+        Coefficient of friction between the ground and the feet, positive: one number for all, or
+        one for each of n planes [-]. Boxes and the links of a fallen robot have the first one.
     normal : array_like, shape (3,) or (n, 3), optional
         Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
         it is normalized.
@@ -97,17 +99,23 @@ class Ground(Value):
         applies to all planes; a plane with offset 0 goes through the origin.
     boxes : sequence of Box, optional
         Boxes on the planes. Where boxes overlap, the highest one is the ground.
+    acceleration : array_like, shape (3,), or callable, optional
+        Acceleration of the whole ground in the world frame [m/s²], constant or as a function
+        `acceleration(t)` of the simulation's time [s]. The ground is at rest at time 0, does not
+        turn, and carries feet and fixed frames along. Planes and boxes are those at time 0.
 
     Attributes
     ----------
-    mu : float
-        Coefficient of friction [-].
+    mus : ndarray, shape (n,)
+        Coefficient of friction of each plane [-].
     normals : ndarray, shape (n, 3)
         Unit normals of all planes in the world frame.
     offsets : ndarray, shape (n,)
         Offsets of all planes [m].
     boxes : tuple of Box
         The boxes.
+    acceleration : ndarray, callable or None
+        Acceleration of the ground; None if the ground is at rest.
 
     Examples
     --------
@@ -120,31 +128,40 @@ class Ground(Value):
     0.2
     """
 
-    mu: float
+    mus: Array
     normals: Array
     offsets: Array
     boxes: tuple[Box, ...]
+    acceleration: Acceleration
 
     def __init__(
         self,
-        mu: float = 1.0,
+        mu: npt.ArrayLike = 1.0,
         normal: npt.ArrayLike = UP,
         offset: npt.ArrayLike = 0.0,
         boxes: Sequence[Box] = (),
+        acceleration: Acceleration = None,
     ):
         normals, offsets = as_half_spaces("the ground", normal, offset)
+        given = numeric_copy(mu)
+        shape = () if given is None or given.ndim == 0 else (len(normals),)
+        mus = np.broadcast_to(as_array("mu of Ground", mu, shape), len(normals))
+        for i, each in enumerate(mus):
+            as_positive(f"mu of Ground for plane {i}" if shape else "mu of Ground", each)
         vars(self).update(
-            mu=as_positive("mu of Ground", mu),
+            mus=read_only(mus),
             normals=normals,
             offsets=offsets,
             boxes=_as_boxes("boxes of Ground", boxes),
+            acceleration=as_acceleration("acceleration of Ground", acceleration),
         )
 
     def __repr__(self) -> str:
         boxes = f", boxes=[{len(self.boxes)} boxes]" if self.boxes else ""
+        moving = "" if self.acceleration is None else ", acceleration=…"
         return (
-            f"Ground(mu={self.mu:g}, normal={self.normals.tolist()}, "
-            f"offset={self.offsets.tolist()}{boxes})"
+            f"Ground(mu={self.mus.tolist()}, normal={self.normals.tolist()}, "
+            f"offset={self.offsets.tolist()}{boxes}{moving})"
         )
 
     @classmethod

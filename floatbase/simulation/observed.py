@@ -47,7 +47,8 @@ class Observed:
         The controller.
     *observers : callable
         Functions observe(q, v, t) -> (q, v), such as `SensorNoise`, `Latency` or your own state
-        estimator. Each gets what the one before it returns; the first gets the true state.
+        estimator. Each gets what the one before it returns; the first gets the true state. One with
+        a method `measure(tau, forces)` also gets torques and contact forces (see `measure`).
 
     Raises
     ------
@@ -85,6 +86,23 @@ class Observed:
     def observers(self) -> tuple[Observer, ...]:
         """The observers, in the order in which they are called."""
         return self._observers
+
+    def measure(self, tau: Array, forces: Array) -> None:
+        """Pass measurements to the observers and the controller that have a method `measure`.
+
+        `rollout` calls this method before each control step.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (d,)
+            Motor torques of the last timestep [N·m].
+        forces : ndarray, shape (points, 3)
+            Force of the last timestep on each contact point of the feet, in the world frame [N].
+        """
+        for part in (*self._observers, self._controller):
+            measure = getattr(part, "measure", None)
+            if measure is not None:
+                measure(tau, forces)
 
     def observe(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         """Return the state that the controller gets.

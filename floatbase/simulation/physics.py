@@ -23,14 +23,17 @@ from floatbase._validation import (
     cross,
     refuse_new_attributes,
 )
-from floatbase.dynamics import UP, Contacts
+from floatbase.dynamics import Contacts, MotionConstraint
+from floatbase.dynamics._compiled import acceleration_at
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
 from floatbase.simulation.build import body_name, build_model, build_spec
+from floatbase.simulation.connections import Connections, parts_of
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.push import Push, as_pushes
+from floatbase.simulation.start import standing_on
 
 # fraction of the base's height at the last reset: a crouching robot keeps more, a lying one less
 FALLEN_HEIGHT_FRACTION = 0.4
@@ -38,7 +41,6 @@ FALLEN_HEIGHT_FRACTION = 0.4
 FALLEN_COSINE = float(np.cos(np.deg2rad(60.0)))
 # m: a base that begins lower than this lies on the ground, so its height cannot indicate a fall
 _MIN_INITIAL_HEIGHT = 1e-3
-_ROUNDING = 1e-9  # m: a foot on the ground may be this far below it
 _MAX_TIMESTEP = 0.1  # s: a robot falls 5 cm in it, and contacts of 4 ms are no longer resolved
 # after this warning of MuJoCo or a later one, its numbers are meaningless
 _FIRST_FATAL_WARNING = int(mujoco.mjtWarning.mjWARN_BADQPOS)
@@ -67,9 +69,15 @@ class Simulation:
     joint_losses : bool, optional
         Whether the joint damping and dry friction in the robot's file act, as in
         <dynamics damping="0.1" friction="0.5"/>. The equations and the controllers ignore them.
+    contacts : Contacts, optional
+        Contacts of a controller, which the simulation then has besides the feet: point contacts,
+        flat feet and wheels at other frames, fixed frames and rigid connections. A reset fixes the
+        frames where they are. The normals and coefficients of friction are those of the ground.
 
     Raises
     ------
+    InputError
+        If the ground accelerates below a robot with a fixed base.
     SimulationError
         If MuJoCo cannot build the robot, or if its mass, gravity, M or h differ from those of the
         robot.
@@ -98,6 +106,7 @@ class Simulation:
         timestep: float = 1e-3,
         *,
         joint_losses: bool = False,
+        contacts: Contacts | None = None,
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._thread_lock = threading.RLock()  # two threads in one MjData crash the process
@@ -105,7 +114,20 @@ class Simulation:
         self._timestep = as_positive("timestep", timestep, "s", maximum=_MAX_TIMESTEP)
         self._feet = Contacts.feet(robot) if robot.feet else Contacts.none()
         self._joint_losses = as_bool("joint_losses", joint_losses)
-        self._model = build_model(robot, self.ground, self.timestep, self.joint_losses)
+        contacts = self._feet if contacts is None else as_instance("contacts", contacts, Contacts)
+        extra = parts_of(self._feet, contacts)
+        self._contacts = self._feet + extra
+        self._build_options = self.ground, self.timestep, self.joint_losses, tuple(extra)
+        if self.ground.acceleration is not None and not robot.is_floating:
+            raise InputError(
+                f"The ground accelerates, but {robot.name} has a fixed base, which is at rest. Use "
+                f"a robot with a floating base, or a ground without acceleration."
+            )
+        self._model = build_model(robot, *self._build_options)
+        self._connections = Connections(self.model, extra)
+        self._gravity = self.model.opt.gravity.copy()
+        # of the ground
+        self._ground_position, self._ground_velocity = np.zeros(3), np.zeros(3)
         self._data = mujoco.MjData(self.model)
         self._conversion = Conversion(robot, self.model)
         self._actuator_ids = np.array(
@@ -171,6 +193,24 @@ class Simulation:
         return self._feet
 
     @property
+    def contacts(self) -> Contacts:
+        """The feet, and what the simulation has of its argument `contacts`."""
+        return self._contacts
+
+    @property
+    def connections(self) -> Contacts:
+        """Fixed frames and rigid connections in `contacts`."""
+        return self._connections.contacts
+
+    @property
+    def ground_position(self) -> Array:
+        """How far the ground has moved since the last reset, shape (3,), world frame [m].
+
+        MuJoCo's `data` is in the frame of the ground, which falls with its acceleration instead.
+        """
+        return self._ground_position.copy()
+
+    @property
     def model(self) -> mujoco.MjModel:
         """MuJoCo's model; switching `link_collisions` changes it."""
         return self._model
@@ -182,8 +222,8 @@ class Simulation:
 
     @property
     def point_names(self) -> tuple[str, ...]:
-        """Names of the robot's contact points: point feet, and corners of flat feet."""
-        return self.feet.point_names
+        """Names of the points in `contacts`: point feet, and corners of flat feet."""
+        return self.contacts.point_names
 
     @property
     def foot_contacts(self) -> FootContacts:
@@ -201,12 +241,19 @@ class Simulation:
 
         Use `sim.reset(sim.state.replace(q=...))` to change it; this also sets the time to 0.
         """
-        return self._conversion.q(self._qpos)
+        q = self._conversion.q(self._qpos)
+        if self._ground.acceleration is not None:
+            q[:3] += self._ground_position
+        return q
 
     @property
     def v(self) -> Array:
         """Velocity in the package's convention, shape (nv,)."""
-        return self._conversion.v(self._qpos, self._qvel)
+        qvel = self._qvel
+        if self._ground.acceleration is not None:
+            qvel = qvel.copy()
+            qvel[self._conversion.qvel_of_v[:3]] += self._ground_velocity
+        return self._conversion.v(self._qpos, qvel)
 
     @property
     def joint_state(self) -> tuple[Array, Array]:
@@ -279,16 +326,24 @@ class Simulation:
         SimulationError
             If another thread is using the simulation.
         """
-        state = self._standing_state() if state is None else as_instance("state", state, State)
+        state = (
+            standing_on(self.robot, self.ground)
+            if state is None
+            else as_instance("state", state, State)
+        )
         if not self.robot.has_joints_of(state.robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."
             )
-        with self.exclusive():
+        with self._exclusive():
             self.link_collisions = False
             mujoco.mj_resetData(self.model, self.data)
             self._qpos[:], self._qvel[:] = self._conversion.to_mujoco(state.q, state.v)
+            self._ground_position[:] = self._ground_velocity[:] = 0.0
+            if len(self.connections):
+                mujoco.mj_kinematics(self.model, self.data)
+                self._connections.fix(self.model, self.data, state)
             mujoco.mj_forward(self.model, self.data)
         self._start_height = self._nominal_height = self._base_height()
         self._start_vertical = self._base_vertical.tolist()
@@ -297,19 +352,8 @@ class Simulation:
             self._nominal_height = float(np.linalg.norm(state.com - self._base_position))
 
     @contextmanager
-    def exclusive(self) -> Iterator[None]:
-        """Reserve the simulation for the current thread, as a context manager.
-
-        Yields
-        ------
-        None
-            Nothing. The reservation ends with the context.
-
-        Raises
-        ------
-        SimulationError
-            If another thread is using the simulation.
-        """
+    def _exclusive(self) -> Iterator[None]:
+        """Reserve the simulation for the current thread, or raise `SimulationError`."""
         if not self._thread_lock.acquire(blocking=False):
             raise SimulationError(
                 "Another thread is using this simulation, for example a live run. Pause the run, "
@@ -328,7 +372,7 @@ class Simulation:
         mujoco.MjSpec
             The description from which `model` was compiled. `sim.spec().to_xml()` is its XML.
         """
-        return build_spec(self.robot, self.ground, self.timestep, self.joint_losses)
+        return build_spec(self.robot, *self._build_options)
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance the simulation by one timestep.
@@ -348,28 +392,26 @@ class Simulation:
             If another thread is using the simulation.
         """
         torques, pushes = as_array("torques", tau, (self.robot.d,), "N·m"), as_pushes(pushes)
-        with self.exclusive():
-            self.advance(torques, pushes)
+        with self._exclusive():
+            self._advance(torques, pushes)
 
-    def advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
-        """Advance by one timestep without the checks of `step`.
-
-        This method is meant for loops that have checked the torques.
-
-        Parameters
-        ----------
-        tau : ndarray, shape (d,)
-            Joint torques, float64 and finite, clipped to the motors' limits [N·m].
-        pushes : tuple of Push, optional
-            External forces; each acts during its own time.
-        """
+    def _advance(self, tau: Array, pushes: tuple[Push, ...] = ()) -> None:
+        """Advance by one timestep without the checks of `step`; the torques are float64."""
         self.data.ctrl[self._actuator_ids] = tau
         self.data.xfrc_applied[:] = 0.0
         for push in pushes:
             fraction = push.active_fraction(self.data.time, self.timestep)
             if fraction > 0.0:
                 self._apply_push(push, fraction * push.force)
+        if self._ground.acceleration is None:
+            mujoco.mj_step(self.model, self.data)
+            return
+        middle = self.time + 0.5 * self.timestep  # second order
+        acceleration = acceleration_at(self._ground.acceleration, middle)
+        self.model.opt.gravity[:] = self._gravity - acceleration  # in the ground's frame
         mujoco.mj_step(self.model, self.data)
+        self._ground_velocity += self.timestep * acceleration  # as MuJoCo integrates
+        self._ground_position += self.timestep * self._ground_velocity
 
     def torques(self) -> Array:
         """Return the motor torques of the last step, within the motors' limits.
@@ -379,21 +421,10 @@ class Simulation:
         ndarray, shape (d,)
             Joint torques [N·m].
         """
-        return self.torques_of(self.data.actuator_force)
+        return self._torques_of(self.data.actuator_force)
 
-    def torques_of(self, actuator_force: Array) -> Array:
-        """Convert MuJoCo's actuator forces to joint torques, without checks.
-
-        Parameters
-        ----------
-        actuator_force : ndarray, shape (..., d)
-            Forces of all actuators in MuJoCo's order [N·m].
-
-        Returns
-        -------
-        ndarray, shape (..., d)
-            Joint torques in the robot's order [N·m].
-        """
+    def _torques_of(self, actuator_force: Array) -> Array:
+        """Convert actuator forces of MuJoCo to joint torques, shape (..., d) [N·m]."""
         return actuator_force[..., self._actuator_ids]
 
     def contact_forces(self) -> Array:
@@ -404,38 +435,18 @@ class Simulation:
         ndarray, shape (points, 3)
             Force on each point of `point_names`, in the world frame [N].
         """
-        geoms, contact_frame_forces = self.read_contacts()
-        forces: Array = self.contact_forces_of(geoms[None], contact_frame_forces[None])[0]
+        geoms, contact_frame_forces = self._read_contacts()
+        forces: Array = self._contact_forces_of(geoms[None], contact_frame_forces[None])[0]
         return forces
 
-    def read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
-        """Return the present contacts of the feet in MuJoCo's terms, for `contact_forces_of`.
-
-        Returns
-        -------
-        geoms : ndarray, shape (n, 2)
-            MuJoCo's ids of plane or box, and ball, of each contact.
-        contact_frame_forces : ndarray, shape (3 n,)
-            Forces [N]: on planes in the contact frames, normal component first, and on boxes in the
-            world frame.
-        """
+    def _read_contacts(self) -> tuple[npt.NDArray[np.int32], Array]:
+        """Return the present contacts of the feet as `FootContacts.read` does."""
         return self.foot_contacts.read(self.model, self.data, self._link_collisions)
 
-    def contact_forces_of(self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array) -> Array:
-        """Convert contacts that `read_contacts` returned at N instants to forces, without checks.
-
-        Parameters
-        ----------
-        geoms : ndarray, shape (N, n, 2)
-            MuJoCo's ids of plane or box, and ball; geom 0 stands for no contact.
-        contact_frame_forces : ndarray, shape (N, 3 n)
-            Forces as from `read_contacts` [N].
-
-        Returns
-        -------
-        ndarray, shape (N, points, 3)
-            Force on each point of `point_names`, in the world frame [N].
-        """
+    def _contact_forces_of(
+        self, geoms: npt.NDArray[np.int32], contact_frame_forces: Array
+    ) -> Array:
+        """Convert contacts of N instants to forces, shape (N, points, 3), world frame [N]."""
         return self.foot_contacts.forces(geoms, contact_frame_forces)
 
     def contact_positions(self) -> Array:
@@ -446,8 +457,41 @@ class Simulation:
         ndarray, shape (points, 3)
             Position of each point of `point_names`, in the world frame [m].
         """
-        geoms = self.foot_contacts.geoms
-        return self.foot_contacts.positions(self.data.geom_xpos[geoms], self.data.geom_xmat[geoms])
+        geoms, data = self.foot_contacts.geoms, self.data
+        positions = self.foot_contacts.positions(data.geom_xpos[geoms], data.geom_xmat[geoms])
+        return positions + self._ground_position
+
+    def connection_forces(self) -> Array:
+        """Return the forces of `connections` during the last step.
+
+        Returns
+        -------
+        ndarray, shape (6 n,)
+            For each of the n connections, force [N] and moment [N·m] on its first frame about that
+            frame's origin, in world axes, as its λ.
+        """
+        return self._connections.forces(self.model, self.data)
+
+    def has(self, contact: MotionConstraint) -> bool:
+        """Return whether the simulation has a contact or another constraint of a controller.
+
+        Parameters
+        ----------
+        contact : MotionConstraint
+            The contact.
+
+        Returns
+        -------
+        bool
+            Whether something acts there. A contact with an acceleration needs a ground with one.
+        """
+        is_moving = getattr(contact, "acceleration", None) is not None
+        if contact.name not in self.contacts.names or (
+            is_moving and self.ground.acceleration is None
+        ):
+            return False
+        is_point = len(getattr(contact, "point_names", ())) == 1  # also in the middle of a sole
+        return is_point or contact.k == self.contacts[contact.name].k
 
     def pushed_body(self, push: Push) -> int:
         """Return MuJoCo's id of the body that a push acts on.
@@ -493,38 +537,6 @@ class Simulation:
         self.data.xfrc_applied[body, :3] += force
         self.data.xfrc_applied[body, 3:] += cross(position - self.data.xipos[body], force)
 
-    def _standing_state(self) -> State:
-        """Return the robot standing on the ground with all feet touching."""
-        robot, ground = self.robot, self.ground
-        planes: dict[str, Any] = {"normal": ground.normals, "offset": ground.offsets}
-        is_biped, is_single_plane = len(robot.feet) <= 2, len(self._planes) == 1
-        if not is_single_plane:
-            state = robot.standing(**planes)
-        elif robot.is_floating and is_biped and ground.normals[0, 2] < 1.0:
-            state = robot.standing(normal=ground.normals[0], balanced=True)
-            if robot.feet:  # where the tilted robot would have its feet
-                shift = np.mean(_foot_middles(self._tilted_state()) - _foot_middles(state), axis=0)
-                state = state.replace(q=np.concatenate([state.q[:3] + shift, state.q[3:]]))
-        else:
-            state = self._tilted_state()
-        if robot.is_floating and robot.feet and ground.boxes:
-            middles = _foot_middles(state)
-            clearances = middles[:, 2] - ground.height(middles[:, :2])
-            if np.any(clearances < np.array([foot.radius for foot in robot.feet]) - _ROUNDING):
-                return robot.standing(**planes, surface=ground.height, balanced=is_biped)
-        return state
-
-    def _tilted_state(self) -> State:
-        """Return the level standing state, tilted with the only plane of the ground."""
-        state = self.robot.standing()
-        if not self.robot.is_floating:
-            return state
-        normal, offset = self.ground.normals[0], self.ground.offsets[0]
-        rotation = pin.Quaternion.FromTwoVectors(np.array(UP), np.array(normal))
-        orientation = (rotation * pin.Quaternion(*state.q[[6, 3, 4, 5]])).normalized()
-        position = rotation.matrix() @ state.q[:3] + offset * normal
-        return state.replace(q=np.concatenate([position, orientation.coeffs(), state.q[7:]]))
-
     def _base_height(self) -> float:
         """Return the height of the base's origin above the nearest plane of the ground [m].
 
@@ -538,11 +550,6 @@ class Simulation:
 
     def __repr__(self) -> str:
         return f"Simulation({self.robot.name}, t={self.time:.3f} s, timestep={self.timestep:g} s)"
-
-
-def _foot_middles(state: State) -> Array:
-    """Return the middle of each foot's sole or ball, shape (feet, 3), world frame [m]."""
-    return np.array([state.point(foot.frame, foot.middle) for foot in state.robot.feet])
 
 
 def _dot(a: list[float], b: list[float]) -> float:

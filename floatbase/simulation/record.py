@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +27,11 @@ from floatbase.robots import Robot, State
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push
+from floatbase.simulation.record_files import read_record, write_record
+from floatbase.simulation.record_table import as_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Outcome = Literal["completed", "fell", "diverged", "controller failed"]
 
@@ -87,6 +93,9 @@ class Rollout(Value):
         Joint limits in the last plan, as in `Command.joint_limits`.
     ground : Ground or None
         The ground of the simulation; None if it is not known.
+    ground_position : ndarray, shape (n, 3), or None
+        How far a ground with an acceleration has moved before the control step, in the world frame
+        [m]; None if it is not known.
     """
 
     _example = "fb.rollout(sim, controller, duration=1.0)"
@@ -109,6 +118,7 @@ class Rollout(Value):
     targets: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
     joint_limits: JointLimits | None = None
     ground: Ground | None = None
+    ground_position: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time.size)
@@ -182,11 +192,77 @@ class Rollout(Value):
             row[:] = pin.centerOfMass(model, data, q)
         return read_only(com)
 
+    def table(self) -> DataFrame:
+        """Return the record as a table, with one row for each control step.
+
+        A column is named by its subject, its quantity, its component and its unit, as in "time
+        [s]", "base position x [m]", "FL_hip_joint torque [N·m]" and "FL_foot measured force z [N]".
+        Frames are those of `q`, `v` and the contact forces. Targets are in `targets` alone.
+
+        Returns
+        -------
+        pandas.DataFrame
+            The table; unknown values are NaN.
+
+        Raises
+        ------
+        MissingDependencyError
+            If pandas is not installed.
+        """
+        return as_table(self)
+
+    def save(self, path: str | Path) -> None:
+        """Save the record as an npz file, which `load` reads.
+
+        The file holds the robot, too. `numpy.load` reads its arrays without floatbase.
+
+        Parameters
+        ----------
+        path : str or Path
+            Path of the file; an existing file is replaced.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+
+        Warns
+        -----
+        SimulationWarning
+            If a contact is user-defined or has functions of time, which files cannot hold.
+        """
+        write_record(path, self)
+
+    @staticmethod
+    def load(path: str | Path, robot: Robot | None = None) -> Rollout:
+        """Load a record that `save` has written.
+
+        Parameters
+        ----------
+        path : str or Path
+            Path of the file.
+        robot : Robot, optional
+            Robot with the joints of the recorded one, for example if its meshes have moved. By
+            default, the robot in the file.
+
+        Returns
+        -------
+        Rollout
+            The record. Linear constraints have no rows, since files hold no functions.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, is not a record, or has another version, or if the robot has
+            other joints.
+        """
+        return Rollout(**read_record(path, robot))
+
     def slip(self, include_rolling: bool = True) -> Array:
         """Compute the largest distance of each contact point from where its stance began.
 
         A point is in stance while the controller's contacts include it. Points that were never in
-        stance have 0.
+        stance have 0. The distance is that on the ground, which may itself move.
 
         Parameters
         ----------
@@ -201,6 +277,8 @@ class Rollout(Value):
         """
         self._check_not_empty()
         positions = self.foot_positions
+        if self.ground_position is not None:
+            positions = positions - self.ground_position[:, None]
         if not as_bool("include_rolling", include_rolling):
             positions = positions - self.rolling_displacement()
         max_distance, first = np.zeros(positions.shape[1]), 0
@@ -284,6 +362,8 @@ class Recorder:
         max_contacts = sim.foot_contacts.max_contacts
         self._step_contact_geoms = np.zeros((ticks * substeps, max_contacts, 2), dtype=np.int32)
         self._step_contact_forces = np.zeros((ticks * substeps, 3 * max_contacts))
+        self._step_connection_forces = np.zeros((ticks * substeps, sim.connections.k))
+        self._ground_position = np.empty((ticks, 3))
         self._stances: list[Contacts] = []
         self._planned_forces = np.empty((ticks, stance.k))
         self._rows_with_plan: list[int] = []  # the rows that have planned forces
@@ -305,10 +385,11 @@ class Recorder:
         geoms = self._sim.foot_contacts.geoms
         self._geom_positions.take(geoms, 0, self._foot_centres[n], "clip")  # "clip": the fastest
         self._geom_rotations.take(geoms, 0, self._foot_rotations[n], "clip")
+        self._ground_position[n] = self._sim.ground_position
 
     def after_step(self) -> None:
         """Record motor forces and contacts of a timestep within the control step."""
-        i, (geoms, forces) = self._n_steps, self._sim.read_contacts()
+        i, (geoms, forces) = self._n_steps, self._sim._read_contacts()
         missing = len(geoms) - self._step_contact_geoms.shape[1]
         if missing > 0:  # a foot touches many boxes
             more_geoms, more_forces = ((0, 0), (0, missing), (0, 0)), ((0, 0), (0, 3 * missing))
@@ -317,6 +398,8 @@ class Recorder:
         self._step_actuator_forces[i] = self._actuator_forces
         self._step_contact_geoms[i, : len(geoms)] = geoms
         self._step_contact_forces[i, : forces.size] = forces
+        if self._step_connection_forces.size:
+            self._step_connection_forces[i] = self._sim.connection_forces()
         self._n_steps += 1
 
     def complete_tick(
@@ -371,7 +454,7 @@ class Recorder:
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
             tau=self._mean_over_substeps(
-                self._sim.torques_of(self._step_actuator_forces[: self._n * self._substeps])
+                self._sim._torques_of(self._step_actuator_forces[: self._n * self._substeps])
             ),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
@@ -388,6 +471,7 @@ class Recorder:
             targets=MappingProxyType(self._targets_by_name()),
             joint_limits=self._joint_limits,
             ground=self._sim.ground,
+            ground_position=self._complete_rows(self._ground_position),
         )
 
     def _targets_by_name(self) -> dict[str, Array]:
@@ -432,21 +516,28 @@ class Recorder:
         A point contact in the middle of a flat foot has the sum of the corners' forces and the mean
         of their positions.
         """
-        sim, n, feet = self._sim, self._n, self._sim.feet
+        sim, n, connections = self._sim, self._n, self._sim.connections
+        touching = sim.contacts.without(*connections.names)
         steps = slice(n * self._substeps)
         measured = self._mean_over_substeps(
-            sim.contact_forces_of(self._step_contact_geoms[steps], self._step_contact_forces[steps])
+            sim._contact_forces_of(
+                self._step_contact_geoms[steps], self._step_contact_forces[steps]
+            )
         )
         lowest = sim.foot_contacts.positions(self._foot_centres[:n], self._foot_rotations[:n])
+        lowest = lowest + self._ground_position[:n, None]
+        of_connections = self._mean_over_substeps(self._step_connection_forces[steps])
         all_forces, all_positions = [np.zeros((n, 0))], [np.zeros((n, 0, 3))]
         for contact in contacts:
             point_names = contact.point_names if isinstance(contact, FrictionContact) else ()
             forces = np.full((n, contact.k), np.nan)
             positions = np.full((n, len(point_names), 3), np.nan)
-            if contact.name in feet.names:
-                part = feet.force_slice(contact.name)
+            if contact.name in connections.names and contact.k == 6:
+                forces = of_connections[:, connections.force_slice(contact.name)]
+            elif contact.name in touching.names:
+                part = touching.force_slice(contact.name)
                 points = slice(part.start // 3, part.stop // 3)
-                if point_names == feet.only(contact.name).point_names:
+                if point_names == touching.only(contact.name).point_names:
                     forces, positions = measured[:, points].reshape(n, contact.k), lowest[:, points]
                 elif len(point_names) == 1:
                     forces = measured[:, points].sum(axis=1)

@@ -39,7 +39,9 @@ class Controller(Protocol):
     The result has an attribute `tau`, shape (d,) [N·m], and optionally `forces`, shape (k,) [N], in
     the world frame. The controller itself may have an attribute `contacts` of type `Contacts`: the
     stance of its last result, which may change from one control step to the next. Without this
-    attribute, all feet are used.
+    attribute, all feet are used. If it has a method `measure(tau, forces)`, `rollout` calls it
+    before each control step with the measurements of the last timestep: the motors' torques, shape
+    (d,) [N·m], and the forces on `sim.point_names`, shape (points, 3), in the world frame [N].
     """
 
     def __call__(self, q: Array, v: Array, t: float) -> Any:
@@ -47,7 +49,11 @@ class Controller(Protocol):
 
 
 class Actuators(Protocol):
-    """A model that converts desired torques into joint torques, and may have a state."""
+    """A model that converts desired torques into joint torques, and may have a state.
+
+    If it has a method `receive(command)`, as `JointServo` has, `rollout` calls it with the command
+    of each control step.
+    """
 
     def step(self, tau_desired: Array, q_joints: Array, v_joints: Array, dt: float) -> Array:
         """Return the torques of the next timestep.
@@ -97,9 +103,10 @@ def rollout(
         Time between two calls of the controller [s], a whole number of timesteps; by default one
         timestep.
     actuators : Actuators, optional
-        Model such as `HydraulicActuators` that converts the controller's torques in every timestep.
-        Without it, the joints get the controller's torques, within the motors' limits. The model's
-        state is kept from one rollout to the next, so reset the model together with the simulation.
+        Model such as `HydraulicActuators` or `JointServo` that converts the controller's torques in
+        every timestep. Without it, the joints get the controller's torques, within the motors'
+        limits. The model's state is kept from one rollout to the next, so reset the model together
+        with the simulation.
     settling_time : float, optional
         Time for which the simulation continues after a fall or a controller failure, so that the
         robot comes to lie on the ground [s]; a whole number of control periods. Meanwhile,
@@ -124,7 +131,8 @@ def rollout(
     Warns
     -----
     SimulationWarning
-        If pushes are given, but none acts during this rollout.
+        If pushes are given, but none acts during this rollout, or if the controller relies on a
+        contact or a constraint that the simulation does not have.
 
     Examples
     --------
@@ -155,7 +163,9 @@ def rollout(
     warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     if warning:
         warn(warning, SimulationWarning)
-    record = Recorder(sim, _current_stance(sim, controller), ticks + settling_ticks, substeps)
+    stance = _current_stance(sim, controller)
+    record = Recorder(sim, stance, ticks + settling_ticks, substeps)
+    missing = _warn_of_missing(sim, stance, set())
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
         controller_off_time = sim.time
@@ -169,18 +179,26 @@ def rollout(
         from tqdm.auto import tqdm  # slow to load
 
         bar = tqdm(bar, "rollout", unit=" ticks")
-    with sim.exclusive():
+    measure = getattr(controller, "measure", None)
+    receive = getattr(actuators, "receive", None)
+    with sim._exclusive():
         for _ in bar:
             t, q, v = sim.time, sim.q, sim.v
             record.before_tick(t, q, v)
             try:
+                if measure is not None:
+                    measure(sim.torques(), sim.contact_forces())
                 command = controller(q, v, t)
             except FloatbaseError as error:
                 return end("controller failed", error)
-            stance = _current_stance(sim, controller)
+            previous, stance = stance, _current_stance(sim, controller)
+            if stance is not previous:
+                missing = _warn_of_missing(sim, stance, missing)
             try:
                 desired = _desired_torques(sim, command)
                 planned = _planned_forces(command, stance)
+                if receive is not None:
+                    receive(command)
                 _run_substeps(sim, desired, substeps, pushes, actuators, record)
             except _NonFiniteTorques as error:
                 return end("controller failed", error)
@@ -275,6 +293,21 @@ def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
     return contacts if isinstance(contacts, Contacts) else sim.feet
 
 
+def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> set[str]:
+    """Warn of contacts that the simulation lacks; return them and the known ones."""
+    missing = {contact.name for contact in stance if not sim.has(contact)}
+    if missing - known:
+        warn(
+            f"The controller relies on {', '.join(sorted(missing - known))}, but the simulation "
+            f"has nothing there. Use fb.Simulation(robot, contacts=controller.contacts), which has "
+            f"points, flat feet and wheels at any frame, fixed frames and rigid connections; "
+            f"moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
+            f"controller.",
+            SimulationWarning,
+        )
+    return known | missing
+
+
 def _run_substeps(
     sim: Simulation,
     desired: Array,
@@ -291,7 +324,7 @@ def _run_substeps(
         if actuators is not None:
             tau = actuators.step(desired, *sim.joint_state, sim.timestep)
             tau = _as_torques(sim, "The actuators' torques", tau)
-        sim.advance(tau, pushes)
+        sim._advance(tau, pushes)
         record.after_step()
 
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from floatbase._files import LARGEST_DATA, open_file, read_file
-from floatbase._validation import short_repr
+from floatbase._files import LARGEST_DATA, file_errors, open_file, read_file
 from floatbase.errors import InputError, SimulationWarning, require, warn
 
 if TYPE_CHECKING:
@@ -35,22 +33,25 @@ def read_sweep(path: str | Path) -> DataFrame:
     Returns
     -------
     pandas.DataFrame
-        A table like that of `sweep`; its index holds the numbers of the completed points.
+        A table like that of `sweep`, with all rows of the file.
 
     Raises
     ------
     InputError
         If the file cannot be read or was not written by a sweep.
     """
-    with _file_errors("path", path, "cannot be read", "Give the path of a sweep's file."):
+    advice = "Give the path of a sweep's file."
+    with file_errors("path", path, "rows.jsonl", "cannot be read", advice):
         content = read_file(path, LARGEST_DATA)
-    return as_frame(_read_rows(path, content))
+    _, found = _read_rows(path, content)
+    rows = [row for same in found.values() for row, _ in same]
+    return as_frame(dict(enumerate(sorted(rows, key=itemgetter("point")))))
 
 
 def as_frame(rows: Mapping[int, Row]) -> DataFrame:
     """Return rows, as point number -> row, as a `pandas.DataFrame` that ends in "error"."""
     pandas, points = require("pandas", "sweep"), sorted(rows)
-    names = dict.fromkeys(name for i in points for name in rows[i] if name != "error")
+    names = dict.fromkeys(name for i in points for name in rows[i] if name not in RESERVED_NAMES)
     index = pandas.Index(points, name="point")
     return pandas.DataFrame([rows[i] for i in points], index, [*names, "error"])
 
@@ -58,19 +59,20 @@ def as_frame(rows: Mapping[int, Row]) -> DataFrame:
 class RowStore:
     """Rows of a sweep, as point number -> row, which are also written to a file if there is one."""
 
-    # the first line of the file describes the sweep, and each further line is a completed point;
-    # the file is locked while the store is open, and an incomplete last line is removed
+    # a line that describes the sweep begins the file, and another one follows where the function
+    # was edited; each other line is a completed point. The file is locked while the store is open,
+    # and an incomplete last line is removed
 
-    def __init__(self, path: str | Path | None, name: str, points: Sequence[Row]):
+    def __init__(self, path: str | Path | None, name: str, source: str, points: Sequence[Row]):
         self.rows: dict[int, Row] = {}
         self._path, self._file = path, -1
         if path is None:
             return
-        with _file_errors("file", path, "cannot be written to", "Give another file."):
+        with file_errors("file", path, "rows.jsonl", "cannot be written to", "Give another file."):
             self._file = open_file(path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                self._resume(path, _header(name, points), points)
+                self._resume(path, _header(name, source, points), points)
             except BaseException:
                 self.close()
                 raise
@@ -94,28 +96,33 @@ class RowStore:
             self._file = -1
 
     def _resume(self, path: str | Path, header: Row, points: Sequence[Row]) -> None:
-        """Read the file after checking that it belongs to this sweep, or begin an empty one."""
+        """Read the rows of these points after checking that the file belongs to this sweep."""
         content = read_file(path, LARGEST_DATA)
         complete_lines = content[: content.rfind(b"\n") + 1]
         if not complete_lines and json.dumps(header).encode().startswith(content):
             os.ftruncate(self._file, 0)
             self._write(header)
             return
-        found = _read_header(path, content)
-        labels = {"sweep": "function", "parameters": "parameters", "points": "number of points"}
-        for key, what in labels.items():
-            if (there := found[key]) != header[key]:
-                what = f"with the {what} {_joined(there)}, not {_joined(header[key])}"
-                raise _wrong_file_error(path, what)
-        if found["grid"] != header["grid"]:
-            raise _wrong_file_error(path, "with the same parameters but different values")
-        self.rows = _read_rows(path, complete_lines)
-        for i, row in self.rows.items():
-            if i not in range(len(points)) or json.dumps(row | points[i]) != json.dumps(row):
-                raise _wrong_file_error(
-                    path, f"whose point {i} has other parameters, because the file was edited"
-                )
+        found, rows = _read_rows(path, content)
+        there, here = _described(found), _described(header)
+        if there != here:
+            raise _wrong_file_error(path, f"holds a sweep of {there}, not of {here}")
+        edited, present = 0, header["source"]  # "" if it is not known
+        for i, point in enumerate(points):
+            if same := rows.get(_key(point, header)):  # a point may be twice in the grid
+                self.rows[i], source = same.pop(0)
+                is_older = source != present and "" not in (source, present)
+                edited += is_older and self.rows[i]["error"] is None
+        if edited:
+            warn(
+                f"{found['sweep']}, its setup, or what they use was edited after {edited} of the "
+                f"rows in {path} were computed. These rows are kept. To compute them again, give "
+                f"another file, or remove this one.",
+                SimulationWarning,
+            )
         os.ftruncate(self._file, len(complete_lines))
+        if found != header:
+            self._write(header)
 
     def _write(self, row: Row) -> None:
         """Write a line to the file."""
@@ -124,29 +131,9 @@ class RowStore:
             "Once the file can be written to again, run the same sweep to resume."
         )
         data = json.dumps(row).encode() + b"\n"
-        with _file_errors("file", self._path, "cannot be written to", advice):
+        with file_errors("file", self._path, "rows.jsonl", "cannot be written to", advice):
             while data:  # a full disk takes only part of a line: the next attempt gives the reason
                 data = data[os.write(self._file, data) :]
-
-
-@contextmanager
-def _file_errors(argument: str, path: Any, what: str, advice: str) -> Iterator[None]:
-    """Raise `InputError` if the path does not name a file, or if the body cannot use the file."""
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(
-            f'{argument} must be a path, such as "rows.jsonl", not {short_repr(path)}.'
-        )
-    try:
-        yield
-    except InputError:
-        raise
-    except BlockingIOError:
-        raise InputError(
-            f"Another sweep is writing to {path}. Wait until it ends, or pass another file."
-        ) from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = getattr(error, "strerror", error)
-        raise InputError(f"{path} {what}: {reason}. {advice}") from None
 
 
 def as_json_value(what: str, value: Any) -> Any:
@@ -167,47 +154,49 @@ def _from_numpy(value: Any) -> Any:
     raise TypeError(f"it holds a value of type {type(value).__name__}")
 
 
-def _header(name: str, points: Sequence[Row]) -> Row:
-    """Return the first line of a file, which describes the sweep."""
-    parameters = list(dict.fromkeys(name for point in points for name in point))
-    digest = hashlib.sha256("\n".join(json.dumps(point) for point in points).encode()).hexdigest()
-    return {"sweep": name, "parameters": parameters, "points": len(points), "grid": digest[:16]}
+def _header(name: str, source: str, points: Sequence[Row]) -> Row:
+    """Return the line of a file that describes the sweep."""
+    parameters = sorted({name for point in points for name in point})
+    return {"sweep": name, "parameters": parameters, "source": source}
 
 
-def _read_header(path: str | Path, content: bytes) -> Row:
-    """Return the first line of a sweep's file, checked."""
-    try:
-        found = json.loads(content.split(b"\n", 1)[0])
-        if set(found) == set(_header("", [])):
-            return dict(found)
-    except (ValueError, TypeError, RecursionError):
-        pass
-    raise _wrong_file_error(path, "that no sweep has written")
+def _key(row: Row, header: Row) -> str:
+    """Return the parameters of a row as a string."""
+    return json.dumps({name: row[name] for name in header["parameters"] if name in row})
 
 
-def _read_rows(path: str | Path, content: bytes) -> dict[int, Row]:
-    """Return point number -> row for all complete lines of a sweep's file."""
-    _read_header(path, content)
-    rows: dict[int, Row] = {}
-    for number, line in enumerate(content.split(b"\n")[1:-1], start=2):
+def _read_rows(path: str | Path, content: bytes) -> tuple[Row, dict[str, list[tuple[Row, str]]]]:
+    """Return the last description of the sweep, and by `_key` the rows of each point.
+
+    Each row has the source of its function. Rows with an error count until a later one is there.
+    """
+    header: Row = {}
+    rows: dict[str, list[tuple[Row, str]]] = {}
+    lines = content.split(b"\n")
+    for number, line in enumerate(lines[:-1] or lines, start=1):
         try:
-            row = json.loads(line)
-            rows[int(row.pop("point"))] = row
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            row = dict(json.loads(line))
+            if "point" not in row:
+                header = {name: row[name] for name in _header("", "", [])}
+                continue
+            key = _key(row, header)
+            same = [old for old in rows.get(key, []) if old[0]["error"] is None]
+            rows[key] = [*same, (row, header["source"])]
+        except (ValueError, TypeError, LookupError, RecursionError):
+            if not header:
+                raise _wrong_file_error(path, "was not written by a sweep") from None
             raise InputError(
                 f"Line {number} of {path} is not a row of a sweep: {line[:80]!r}. Remove the line, "
                 "and run the sweep again."
             ) from None
-    return rows
+    return header, rows
 
 
-def _joined(value: Any) -> str:
-    """Return a value as a string; a list as its entries with commas."""
-    return ", ".join(value) if isinstance(value, list) else str(value)
+def _described(header: Row) -> str:
+    """Return the function and the parameters of a sweep."""
+    return f"{header['sweep']} over {', '.join(header['parameters']) or 'no parameters'}"
 
 
 def _wrong_file_error(path: str | os.PathLike[str], what: str) -> InputError:
     """Return the error for a file that does not belong to this sweep."""
-    return InputError(
-        f"{path} is a file {what}. It was not changed. Give another file, or remove this one."
-    )
+    return InputError(f"{path} {what}. It was not changed. Give another file, or remove this one.")

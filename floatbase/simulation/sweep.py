@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import hashlib
+import inspect
 import itertools
 import os
 import pickle
+import textwrap
 import threading
 import time
 import traceback
@@ -69,9 +73,9 @@ def sweep(
     file : str or Path, optional
         Path of a JSON Lines file to which each row is written as it finishes. Running the same
         sweep with the same file resumes it, even after it was killed; at most two points for each
-        worker are computed again. Points whose row has an error are also computed again. The file
-        identifies the function by its name, so use another file after changing what the function
-        does. `read_sweep` reads a file.
+        worker are computed again. Points whose row has an error are also computed again. The values
+        of the grid may change: points that are in the file are not computed again. `read_sweep`
+        reads a file.
     workers : int, optional
         Number of processes, by default one for each core. Each process uses one thread for linear
         algebra, so that the rows are bit-identical for any number of workers.
@@ -97,6 +101,12 @@ def sweep(
     SimulationError
         If a process or the cluster breaks down, or if an exception of `setup` cannot be loaded
         here. Rows in the file are kept, also after an interrupt.
+
+    Warns
+    -----
+    SimulationWarning
+        If the function, `setup`, or a function or constant of the same module that they use was
+        edited after rows of the file were computed.
 
     Examples
     --------
@@ -130,7 +140,7 @@ def sweep(
     require("pandas", "sweep")  # missing libraries are reported before hours of work
     executor = _executor(_worker_count(workers), cluster)
     job = _pickled(function, setup)
-    with closing(RowStore(file, name, json_points)) as store:
+    with closing(RowStore(file, name, _source_digest(function, setup), json_points)) as store:
         done = {i for i, row in store.rows.items() if row["error"] is None}
         pending = [(i, point) for i, point in enumerate(points) if i not in done]
         with closing(_answers(executor, job, pending)) as answers:
@@ -208,6 +218,32 @@ def _function_name(function: Any, file: Any) -> str:
             "function with def, and make its constants parameters of the grid."
         )
     return type(function).__name__ if name is None else name.rpartition("<locals>.")[2]
+
+
+def _source_digest(*functions: Any) -> str:
+    """Return a digest of the source of functions and of what they use, "" if it is not known."""
+    parts: dict[Any, str] = {}
+    for function in functions:
+        _add_source(function, parts)
+    return hashlib.sha256("\n".join(parts.values()).encode()).hexdigest()[:16] if parts else ""
+
+
+def _add_source(function: Any, parts: dict[Any, str]) -> None:
+    """Add the source of a function, without comments, and of what it uses from its module."""
+    function = inspect.unwrap(getattr(function, "__func__", function))
+    name = getattr(function, "__name__", "<lambda>")
+    if name == "<lambda>" or function in parts:  # the source of a lambda is its whole line
+        return
+    try:
+        parts[function] = ast.unparse(ast.parse(textwrap.dedent(inspect.getsource(function))))
+        used = inspect.getclosurevars(function)
+    except (OSError, TypeError, ValueError, SyntaxError):  # in C, typed into a prompt, or a class
+        return
+    for name, value in sorted({**used.globals, **used.nonlocals}.items()):
+        if getattr(value, "__module__", None) == function.__module__:
+            _add_source(value, parts)
+        with suppress(InputError):  # values other than numbers, strings and lists of them
+            parts[function, name] = f"{name} = {as_json_value(name, value)}"
 
 
 def _check_function(function: Callable[..., Any], setup: Any, points: list[Row]) -> None:

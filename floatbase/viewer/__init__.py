@@ -6,7 +6,7 @@ from. `shapes` and `markers` make additional items for a picture, in the `colour
 recovery.
 """
 
-from floatbase.errors import ViewerError
+from floatbase.errors import ViewerError, explain_arguments
 
 try:
     from floatbase.viewer import plots
@@ -39,3 +39,5 @@ __all__ = [
     "shapes",
     "status_message",
 ]
+
+explain_arguments(globals())

@@ -351,7 +351,10 @@ class Viewer(Controls, Output):
         ground = self.painter.drawn_ground
         settings = (
             *self._caption(legend.kinds(picture), title, ghost_name),
-            protocol.set_ground(ground.planes, ground.boxes if isinstance(ground, Terrain) else ()),
+            protocol.set_ground(
+                [plane for plane in ground.planes if plane.normal[2] >= MIN_VERTICAL],
+                ground.boxes if isinstance(ground, Terrain) else (),
+            ),
         )
         self.renderer.draw(picture, *settings)  # in one frame, because a second one would wait
 
@@ -579,12 +582,12 @@ def _ground(ground: Ground | npt.ArrayLike | None) -> DrawnGround | None:
     from floatbase.simulation import Ground
 
     made = ground if isinstance(ground, Ground) else Ground(normal=unit_vector("ground", ground))
-    planes = []
-    for (x, y, z), offset in zip(made.normals.tolist(), made.offsets.tolist(), strict=True):
-        if z < MIN_VERTICAL:
-            raise InputError(
-                f"ground has the normal {[x, y, z]}; it must point upwards, as [0, 0, 1] does."
-            )
-        planes.append(Plane((x, y, z), offset))
+    normals, offsets = made.normals.tolist(), made.offsets.tolist()
+    if made.normals[:, 2].max() < MIN_VERTICAL:
+        raise InputError(
+            f"ground has the normal {normals[0]}; at least one must point upwards, as [0, 0, 1] "
+            f"does."
+        )
+    planes = [Plane(tuple(n), offset) for n, offset in zip(normals, offsets, strict=True)]
     base = planes[0] if len(planes) == 1 else Planes(tuple(planes))
     return Terrain(base, tuple(map(tuple, made.box_bounds.tolist()))) if made.boxes else base

@@ -242,8 +242,6 @@ def test_braking_follows_the_torque_limits_of_the_controller():
     assert Limits.of(robot, joint_limits=None).joint_limits is None
     with raises(InputError, "joint_limits", "Limits.of"):
         Limits(robot.torque_limits, joint_limits="robot")
-    with raises(InputError, "facet"):
-        Limits.of(robot, facet=8)
 
 
 def test_soft_bounds_have_rows_only_where_there_are_bounds():
@@ -302,13 +300,11 @@ def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_arrays_of
 
 
 def test_joint_limits_that_do_not_fit_are_refused():
-    robot, limits = judges.load("go2"), limits_of(3, np.random.default_rng(0))
+    limits = limits_of(3, np.random.default_rng(0))
     with raises(InputError, "joint limits", "3", "12"):
         judges.controller_of("go2", joint_limits=limits)
     with raises(InputError, "joint_limits"):
         judges.controller_of("go2", joint_limits="all")
-    with raises(InputError, "speed"):
-        JointLimits.of(robot, speed=3.0)
     for changes in (
         {"lower": 2.0 * np.ones(3)}, {"velocity": [1.0, 0.0, 1.0]}, {"braking": [np.inf] * 3},
         {"upper": np.ones(2)}, {"upper": [np.nan] * 3}, {"period": 0.0}, {"weight": -1.0},

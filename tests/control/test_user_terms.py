@@ -4,7 +4,7 @@ import copy
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from typing import ClassVar
@@ -290,8 +290,9 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
     with event.install_recorder("numba:compile") as recorder:
         for contacts, tasks, rows in choices:
             bounds = {"FR_foot": 90.0}
-            limits = replace(controller.limits, inequalities=rows, max_normal_force=bounds)
-            other = controller.replace(contacts=contacts, tasks=tasks, limits=limits)
+            other = controller.replace(
+                contacts=contacts, tasks=tasks, inequalities=rows, max_normal_force=bounds
+            )
             assert other(state.q, state.v).backend == "compiled"
     assert not recorder.buffer
     assert len(tick.tick.signatures) == 1  # numba compiles again for a read-only array

@@ -16,7 +16,14 @@ from messages import refused
 
 import floatbase as fb
 from floatbase import dynamics, objectives
-from floatbase.dynamics import LinearConstraint, RollingWheel, fixed_frame, moving_frame
+from floatbase.dynamics import (
+    LinearConstraint,
+    PointContact,
+    RollingWheel,
+    fixed_frame,
+    moving_frame,
+    rigid_between,
+)
 from floatbase.errors import InputError
 from floatbase.robots import Robot
 
@@ -188,6 +195,15 @@ def test_a_driven_frame_has_the_desired_acceleration_at_that_time():
         assert np.allclose(force, rate[:3] + np.array([0.0, 0.0, state.robot.mass * G]), atol=1e-7)
 
 
+def test_a_contact_on_accelerated_ground_accelerates_with_it():
+    ground = np.array([0.3, -0.2, 0.5])
+    for seed, acceleration in enumerate((ground, lambda t: ground * t / 2.0)):
+        state = judges.load("go2").random_state(seed, spread=0.6)
+        qdd, _ = motion(state, PointContact("FL_foot", acceleration=acceleration), t=2.0)
+        found = judges.acceleration_of(lambda s: s.point("FL_foot"), state, qdd)
+        assert np.allclose(found, ground, atol=1e-4)
+
+
 # the wheel ----------------------------------------------------------------------------------------
 
 
@@ -199,7 +215,7 @@ def test_b_of_a_wheel_and_of_bolts_is_minus_the_change_of_their_rows_along_the_m
         state = fb.State(cart, q, rng.normal(size=cart.nv))
         normal = judges.random_normals(1, seed)[0]
         wheel = RollingWheel("wheel", [0.1, 1.0, -0.2], 0.17, normal, centre=[0.1, 0.2, -0.3])
-        for each in (wheel, fixed_frame("body")):
+        for each in (wheel, fixed_frame("body"), rigid_between("wheel", "body")):
             A, b = each.constraint(state)
             expected = -judges.derivative(lambda s, c=each: c.jacobian(s) @ s.v, state, state.v)
             assert np.linalg.norm(expected) > 1e-2

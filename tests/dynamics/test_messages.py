@@ -15,6 +15,7 @@ from floatbase.dynamics import (
     bias_forces,
     fixed_frame,
     moving_frame,
+    rigid_between,
     view_from_rotating_frame,
 )
 from floatbase.errors import InputError, UnknownNameError
@@ -72,6 +73,12 @@ def wheel(**wrong: object) -> RollingWheel:
         (lambda: constrained(np.eye(18)[:2], np.zeros(3)), "b", "bad", 3, 2),
         (lambda: constrained(np.eye(18)[:2], np.full(2, np.nan)), "b", "bad", np.nan),
         (lambda: eom(fb.Contacts([moving_frame("base", lambda t: np.zeros(2))])), 2, 3),
+        (lambda: moving_frame("base", None), "acceleration", "fixed_frame"),
+        (lambda: PointContact("toe", acceleration=[0.0, 1.0]), "acceleration", "toe", 2, 3),
+        (lambda: PointContact("toe", acceleration=lambda: 0), "acceleration", "toe", "t"),
+        (lambda: eom(fb.Contacts.points(GO2, acceleration=lambda t: np.zeros(2))), 2, 3),
+        (lambda: rigid_between("base", "base"), "base"),
+        (lambda: eom(fb.Contacts([rigid_between("FL_calf", "FL_foot")])), "FL_calf", "FL_foot"),
         (lambda: wheel(axis=[0, 0, 0]), "axis", "disc"),
         (lambda: wheel(radius=0.0), "radius", "disc", 0),
         (lambda: wheel(mu=0.0), "mu", "disc", 0),

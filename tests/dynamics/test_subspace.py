@@ -17,6 +17,7 @@ from messages import raises
 
 import floatbase as fb
 from floatbase import dynamics
+from floatbase._geometry import minimum_jerk
 from floatbase.dynamics import EquationsOfMotion, PointContact, fixed_frame
 from floatbase.errors import InputError
 
@@ -363,7 +364,7 @@ def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_1e_4_of_the_weig
 
     def sway(t: float) -> Array:
         path = np.array([0.02 * np.sin(6.0 * t), 0.0, 0.01 * np.sin(9.0 * t)])
-        return standing.com + min(1.0, 4.0 * t) * path
+        return standing.com + minimum_jerk(4.0 * t)[0] * path
 
     tasks = (fb.CoMTask(sway), *fb.standing_tasks(standing)[1:])
     controller = fb.WholeBodyController(robot, contacts, tasks)

@@ -6,9 +6,13 @@ from typing import Any
 
 import judges
 import numpy as np
+import pinocchio as pin
+from messages import raises
 
 import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
+from floatbase.errors import InputError
+from floatbase.objectives import AngularMomentumTask, AxisTask, RelativePoseTask
 
 N = 5
 # rad: on the arm of anymal_kinova, gravity leaves half of it with a posture of small weight
@@ -150,10 +154,78 @@ def test_a_moving_target_is_evaluated_once_a_tick_and_followed_without_lag():
         wanted = state.com[1] + amplitude * np.sin(rate * run.time)
         return float(np.max(np.abs(run.com[1000:, 1] - wanted[1000:])))
 
-    lag = error(lambda t: path(t)[0])
+    lag = error(lambda t: (path(t)[0], np.zeros(3), np.zeros(3)))
     assert 0.7 < lag / (0.2 * amplitude * rate) < 1.1  # kd / kp = 0.2 s
     assert error(path) < 0.1 * lag
     assert len(asked) == len(set(asked))
+    assert error(lambda t: path(t)[0]) < 0.03 * amplitude
+
+
+def turning(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A rotation about two axes, with its angular velocity and acceleration in the world."""
+    about_z, x = judges.rotation([0.0, 0.0, 2.0 * t]), np.array([1.0, 0.0, 0.0])
+    velocity = np.array([0.0, 0.0, 2.0]) + 3.0 * about_z @ x
+    return about_z @ judges.rotation(3.0 * t * x), velocity, 6.0 * about_z @ [0.0, 1.0, 0.0]
+
+
+def test_a_target_that_a_function_returns_alone_is_differentiated():
+    robot = judges.load("kinova")
+    q, rates = robot.standing().q, np.linspace(-1.0, 1.0, robot.d)
+    place, velocity = np.array([0.3, -0.2, 5.0]), np.array([1.0, 2.0, 3.0])
+
+    def pose(t: float) -> np.ndarray:
+        return pin.SE3(turning(t)[0], place + velocity * t).homogeneous
+
+    _, omega, alpha = turning(0.3)
+    cases = [
+        (fb.CoMTask(lambda t: np.sin(t) * place), np.cos(0.3) * place, -np.sin(0.3) * place),
+        (fb.OrientationTask("base", lambda t: turning(t)[0]), omega, alpha),
+        (
+            fb.PostureTask(lambda t: pin.integrate(robot.model, q, t * t * rates)),
+            0.6 * rates,
+            2.0 * rates,
+        ),
+        (
+            RelativePoseTask("base", "other", pose),
+            np.append(velocity, omega),
+            np.append(np.zeros(3), alpha),
+        ),
+        (AngularMomentumTask(lambda t: np.sin(t) * place), np.cos(0.3) * place),
+    ]
+    for task, *expected in cases:
+        _, *found = task.targets_at(robot, 0, 0.3)
+        for one, other in zip(found, expected, strict=True):
+            assert np.allclose(one, other, rtol=0.0, atol=5e-3 * np.abs(other).max() + 1e-6)
+    axis = AxisTask("base", [0.0, 0.0, 1.0], lambda t: turning(t)[0][:, 2])
+    state = judges.load("go2").random_state(0)
+    eom = fb.equations_of_motion(state, fb.Contacts.none())
+    full = AxisTask("base", [0.0, 0.0, 1.0], lambda t: (turning(t)[0][:, 2], *turning(t)[1:]))
+    assert np.allclose(axis.residual(eom, 0.3).b, full.residual(eom, 0.3).b, atol=0.05)
+
+
+def test_jumps_kinks_and_ends_of_a_target_function_do_not_make_it_kick():
+    robot, up = judges.load("go2"), np.array([0.0, 0.0, 1.0])
+
+    def rates_of(path: Callable[[float], float], t: float) -> list[float]:
+        targets = fb.CoMTask(lambda t: path(t) * up).targets_at(robot, 0, t)
+        return [float(target[2]) for target in targets[1:]]
+
+    def ends(t: float) -> float:
+        if not 0.0 <= t <= 1.0:
+            raise ValueError(t)
+        return t * t
+
+    noise = np.random.default_rng(0)
+    for t in np.linspace(0.999, 1.001, 17):
+        assert rates_of(lambda t: 1.0 * (t >= 1.0), t) == [0.0, 0.0]
+        assert rates_of(lambda t: int(1000 * t) / 1000, t) == [0.0, 0.0]
+        assert np.allclose(rates_of(lambda t: max(t - 1.0, 0.0), t)[1], 0.0, atol=1e-6)
+        assert rates_of(lambda t: t + noise.normal(), t) == [0.0, 0.0]
+    assert np.allclose(rates_of(ends, 0.0), [0.0, 2.0], atol=1e-6)
+    assert np.allclose(rates_of(ends, 1.0), [2.0, 2.0], atol=1e-6)
+    assert rates_of(lambda t: 0.3, 0.0) == [0.0, 0.0]
+    with raises(InputError, "centre of mass", "acceleration"):
+        fb.CoMTask({0.5: up}.__getitem__).targets_at(robot, 0, 0.5)
 
 
 def test_damping_is_critical_unless_it_is_given():

@@ -9,7 +9,7 @@ from messages import missing, refused
 from values import controller
 
 import floatbase as fb
-from floatbase.dynamics import fixed_frame
+from floatbase.dynamics import fixed_frame, rigid_between
 from floatbase.errors import InputError, UnknownNameError, unknown_name
 from floatbase.robots import Foot
 from floatbase.simulation import LiveSimulation
@@ -129,7 +129,8 @@ def test_a_name_that_no_file_can_hold_is_refused(name, tmp_path):
     view = fb.Viewer(GO2)
     view.show(GO2.standing())
     for call in (
-        lambda: fixed_frame(name), lambda: fb.FrameTask(name, np.zeros(3)),
+        lambda: fixed_frame(name), lambda: rigid_between("base", name),
+        lambda: fb.FrameTask(name, np.zeros(3)),
         lambda: view.add_text(name, "x"), lambda: view.save(tmp_path / f"{name}.html"),
     ):  # fmt: skip
         with pytest.raises(InputError):

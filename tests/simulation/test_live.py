@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 
 import judges
 import numpy as np
@@ -324,11 +325,13 @@ def test_a_second_thread_cannot_use_a_simulation_that_runs():
             except Exception as error:
                 refused.append(error)
 
-    with sim.exclusive():
-        sim.step(np.zeros(12))  # the thread that has reserved it may use it
+    def controller(q: object, v: object, t: float) -> SimpleNamespace:
         thread = threading.Thread(target=use)
         thread.start()
         thread.join()
+        return SimpleNamespace(tau=np.zeros(12))
+
+    fb.rollout(sim, controller, sim.timestep)
     assert [type(error) for error in refused] == [SimulationError] * 2
     assert sim.time == sim.timestep
     use()

@@ -2,6 +2,8 @@
 
 import copy
 import pickle
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import judges
@@ -43,6 +45,48 @@ def test_a_controller_gets_what_the_observers_return_one_after_the_other():
     q, v, t = (np.array(rows) for rows in zip(*controller.seen, strict=True))
     assert np.array_equal(q, run.q) and np.array_equal(t, run.time)
     assert np.allclose(v, 2.0 * (run.v + 1.0))
+
+
+class Scales:
+    """An observer that keeps the measured torques and forces."""
+
+    def __init__(self) -> None:
+        self.tau, self.forces = [], []
+
+    def measure(self, tau: np.ndarray, forces: np.ndarray) -> None:
+        self.tau.append(tau)
+        self.forces.append(forces)
+
+    def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return q, v
+
+
+def test_observers_get_the_torques_and_the_contact_forces_of_the_last_timestep():
+    outer, inner = Scales(), Scales()
+    observed = Observed(Observed(judges.controller_of("go2"), inner), outer)
+    run = fb.rollout(fb.Simulation(judges.load("go2")), observed, 0.2)
+    assert np.allclose(outer.tau[1:], run.tau[:-1])
+    assert np.allclose(np.reshape(outer.forces, (200, 12))[1:], run.measured[:-1])
+    weight = judges.load("go2").weight
+    assert np.allclose(np.sum(outer.forces, axis=1)[-20:], [0.0, 0.0, weight], atol=0.05 * weight)
+    assert np.array_equal(outer.tau, inner.tau)
+
+
+@pytest.mark.front_end  # three seconds
+def test_the_documented_leg_odometry_drifts_over_ten_metres_as_its_page_says():
+    robot = judges.load("go2")
+    page = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
+    source = re.search(r"^class LegOdometry.*?(?=\n\n\n)", page, re.M | re.S)
+    assert source
+    exec(source[0], names := {"fb": fb, "np": np})
+    for noise, drift in (([], 0.04), ([SensorNoise(robot)], 0.06)):
+        walk = Walk(robot, judges.stance(robot), Gait.trot(robot, start=0.2), velocity=[0.5, 0.0])
+        odometry = names["LegOdometry"](robot, judges.stance(robot))
+        observed = Observed(walk, *noise, odometry)
+        run = fb.rollout(fb.Simulation(robot), observed, 20.5, control_period=0.002)
+        assert run.q[-1, 0] > 9.5 + run.q[0, 0]
+        error = np.linalg.norm(odometry.position - run.q[-1, :3])
+        assert error == pytest.approx(drift, abs=0.02)
 
 
 @pytest.mark.parametrize("name", ["go2", "anymal_kinova", "ur5"])

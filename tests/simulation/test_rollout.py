@@ -4,12 +4,18 @@ import judges
 import numpy as np
 import pytest
 from judges import Torques, limp
-from messages import missing, raises, refused
+from messages import missing, raises, refused, warns
 
 import floatbase as fb
 from floatbase.control import Command
 from floatbase.dynamics import fixed_frame
-from floatbase.errors import FloatbaseError, InfeasibleError, InputError, UnknownNameError
+from floatbase.errors import (
+    FloatbaseError,
+    InfeasibleError,
+    InputError,
+    SimulationWarning,
+    UnknownNameError,
+)
 from floatbase.robots import State, with_floating_base
 
 
@@ -200,9 +206,9 @@ def test_moving_targets_see_the_simulations_clock(sim):
     seen = []
     target = sim.robot.standing().com
 
-    def path(t: float) -> np.ndarray:
+    def path(t: float) -> tuple[np.ndarray, ...]:
         seen.append(t)
-        return target + np.array([0.0, 0.05 * t, 0.0])
+        return target + [0.0, 0.05 * t, 0.0], np.array([0.0, 0.05, 0.0]), np.zeros(3)
 
     robot = sim.robot
     tasks = [fb.CoMTask(path), fb.OrientationTask(), fb.PostureTask(robot.standing().q)]
@@ -263,7 +269,8 @@ def test_contacts_and_constraints_that_the_physics_lacks_are_not_measured_as_zer
     points = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot", "FL_calf"])
     contacts = points + fb.Contacts([fixed_frame("base")])
     controller = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
-    record = fb.rollout(fb.Simulation(robot), controller, 0.005)
+    with warns(SimulationWarning, "FL_calf", "bolts of base"):
+        record = fb.rollout(fb.Simulation(robot), controller, 0.005)
     assert np.all(np.isnan(record.measured[:, 6:]))
     assert np.all(np.isfinite(record.measured[:, :6]))
     assert record.foot_positions.shape == (5, 3, 3)

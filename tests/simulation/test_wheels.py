@@ -69,3 +69,5 @@ def test_leaning_wheels_stand_on_their_rims_and_the_record_agrees_with_the_model
     touching = {sim.model.geom(contact.geom[1]).name: contact.pos for contact in sim.data.contact}
     assert np.abs([touching[name] for name in contacts.point_names] - expected).max() < 1e-3
     assert np.abs(run.measured[-1] - run.planned[-1]).max() < 1e-3 * robot.weight
+    forces = run.measured[-1].reshape(-1, 3)
+    assert np.all(np.hypot(*forces[:, :2].T) < contacts.mus * forces[:, 2])

@@ -2,18 +2,19 @@
 
 import dataclasses
 import re
+from fnmatch import fnmatch
 
 import judges
 import matplotlib
 import msgpack
 import numpy as np
 import pytest
-from messages import refused
+from messages import raises, refused
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.dynamics import Contacts, LinearConstraint
-from floatbase.errors import InputError, ViewerError
+from floatbase.errors import InputError, UnknownNameError, ViewerError
 from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Push, Rollout
 from floatbase.viewer import Viewer, plots
@@ -312,7 +313,66 @@ def test_plots_show_the_record(go2):
     used = plots.friction_used(rollout, rollout.measured)
     assert used[0, 1000] == pytest.approx(0.9 / 0.6) and used[1, 1000] == 0.0
     assert np.isnan(used[3, -1])
-    assert len(plots.plot_run(rollout).axes) == 4
     forces = plots.plot_forces(rollout)
-    assert_allclose(forces.lines[1].get_ydata(), rollout.measured[:, 2])
+    curves = {line.get_label(): line.get_ydata() for line in forces.lines}
+    assert_allclose(curves["FL_foot"], rollout.measured[:, 2])
+    matplotlib.pyplot.close("all")
+
+
+def labels(axis):
+    return [text.get_text() for text in axis.get_legend().get_texts()]
+
+
+@pytest.mark.parametrize(
+    "select, plotted",
+    [
+        ([], ["displacement", "normal", "friction", "torque"]),
+        (["torques"], ["torque"]),
+        (["R*_foot"], ["normal", "friction"]),
+        (["com", "FL_*"], ["displacement", "normal", "friction", "torque"]),
+        (["forces", "FR_foot", "*_hip_joint"], ["normal", "torque"]),
+    ],
+)
+def test_plots_show_what_is_selected(go2, select, plotted):
+    rollout = record(go2, 0.1)
+    axes = plots.plot_run(rollout, select).axes
+    assert [axis.get_ylabel().split()[0] for axis in axes] == plotted
+    for axis in axes:
+        names = {*rollout.contacts.names, *go2.joint_names}
+        for name in names & {*labels(axis)}:
+            chosen = [pattern for pattern in select if "_" in pattern]
+            assert not chosen or any(fnmatch(name, pattern) for pattern in chosen)
+    matplotlib.pyplot.close("all")
+
+
+def test_plots_name_the_joints_nearest_to_their_limits_and_both_records(go2):
+    one = record(go2, 0.1)
+    tau = np.zeros((len(one), 12))
+    tau[5:, 4], tau[5:, 9] = 0.5 * go2.torque_limits[4], -0.7 * go2.torque_limits[9]
+    axis = plots.plot_torques(dataclasses.replace(one, tau=tau))
+    assert {go2.joint_names[4], go2.joint_names[9]} < {*labels(axis)}
+    assert "6 others, up to 0 %" in labels(axis) and len(axis.lines) >= 12
+    axes = plots.plot_run(
+        {"stiff": one, "soft": dataclasses.replace(one, tau=tau)}, ["forces", "com"]
+    ).axes
+    for axis in axes:
+        assert {"stiff", "soft"} < {*labels(axis)} and "planned" not in labels(axis)
+    for wrong, kind in (("FL_foot", InputError), (["FL_foo"], UnknownNameError)):
+        with raises(kind, "FL_foot"):
+            plots.plot_run(one, wrong)
+    for wrong in ({}, {"one": 3}, {3: one}, 3):
+        with pytest.raises(InputError):
+            plots.plot_run(wrong)
+    matplotlib.pyplot.close("all")
+
+
+def test_the_sole_of_a_humanoid_is_one_curve_and_its_friction_that_of_the_worst_corner():
+    rollout = record(judges.load("talos"), 1.0)
+    foot = rollout.contacts.names[0]
+    curves = [
+        {line.get_label(): line.get_ydata() for line in plot(rollout).lines}[foot]
+        for plot in (plots.plot_forces, plots.plot_friction)
+    ]
+    assert_allclose(curves[0], rollout.force(foot)[:, 2])
+    assert curves[1].max() == pytest.approx(0.9 / rollout.contacts.mus[0])
     matplotlib.pyplot.close("all")

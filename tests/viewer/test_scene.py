@@ -155,8 +155,18 @@ def test_only_the_visible_part_of_each_side_of_a_valley_is_drawn(viewer, go2):
     shadow = matrices(viewer, "/meshcat/com/")["projection"][:3, 3]
     assert_allclose(shadow[:2], state.com[:2], atol=1e-6)
     assert ground.clearances(shadow).min() == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_wall_is_drawn_above_the_floor_only_and_needs_a_floor(viewer, go2):
+    walled = Ground(normal=[[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], offset=[0.0, -0.5])
+    viewer.set_ground(walled)
+    viewer.show(go2.standing(), Contacts.points(go2))
+    points = vertices(viewer.renderer.picture["ground"])
+    on_wall = np.abs(points[:, 1] - 0.5) < 1e-5
+    assert np.ptp(points[on_wall, 2]) > 1.0 and points[:, 2].min() > -1e-5
+    assert points[:, 1].max() < 0.5 + 1e-5
     with raises(InputError, "ground"):
-        Viewer(go2, ground=Ground(normal=[[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
+        viewer.set_ground(Ground(normal=[0.0, 1.0, 0.0]))
 
 
 def test_boxes_of_the_ground_are_drawn_with_their_sides_and_the_robot_stands_on_them(viewer, go2):

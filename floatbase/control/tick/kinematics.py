@@ -11,7 +11,7 @@ import numpy as np
 
 from floatbase.control.tick.dynamics import Bodies, point_velocity
 from floatbase.control.tick.jit import jit
-from floatbase.control.tick.problem_arrays import DRIVEN_FRAME, FLAT, POINT, USER_DEFINED, WHEEL
+from floatbase.control.tick.problem_arrays import CONNECTION, FLAT, POINT, USER_DEFINED, WHEEL
 from floatbase.control.tick.vectors import (
     across,
     cross,
@@ -31,8 +31,9 @@ from floatbase.dynamics._compiled import MIN_TILT
 class ContactTable(NamedTuple):
     """C contacts with P points."""
 
-    # (C, 7), joint, kind, first point, number of points, of motion rows, of entries of λ, and 1 if
-    # the controller assumes that its forces have no effect
+    # (C, 9), joint, kind, first point, number of points, of motion rows, of entries of λ, 1 if the
+    # controller assumes that its forces have no effect, 3 if `inputs` has an acceleration, and the
+    # joint of the other frame of a connection
     table: Any
     # (C, 19), pose of the frame in the joint (12), normal in the world, radius, axle in the frame
     frames: Any
@@ -40,7 +41,7 @@ class ContactTable(NamedTuple):
     points: Any
     inputs: Any  # packed by `user_terms.UserTerms`
     # where the numbers of contacts start in it, one contact after another: A, b, J and positions of
-    # user-defined ones, accelerations of driven frames
+    # user-defined ones, accelerations of others
     user_start: Any
     same_rows: Any  # whether A and J are the same
     positions: Any  # (P, 3), memory for the positions of the points, world
@@ -74,11 +75,14 @@ def body_jacobian(bodies: Bodies, joint, linear, p, out, row, factor=1.0):
 
 
 @jit
-def frame_jacobian(bodies: Bodies, joint, p, n_rows, out, row):
-    """Add the Jacobian of a frame at p to out (·, nv): linear rows, then angular if n_rows = 6."""
-    body_jacobian(bodies, joint, True, p, out, row)
-    if n_rows == 6:
-        body_jacobian(bodies, joint, False, p, out, row + 3)
+def frame_jacobian(bodies: Bodies, joint, p, n_rows, out, row, other):
+    """Add the Jacobian of a frame at p relative to another joint's body to out (·, nv).
+
+    It has linear rows, then angular rows if n_rows = 6.
+    """
+    for r in range(0, n_rows, 3):
+        body_jacobian(bodies, joint, r == 0, p, out, row + r)
+        body_jacobian(bodies, other, r == 0, p, out, row + r, -1.0)
 
 
 @jit
@@ -120,7 +124,7 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
     for i in range(contacts.table.shape[0]):
         joint, kind, first = contacts.table[i, 0], contacts.table[i, 1], contacts.table[i, 2]
         count = contacts.table[i, 3]
-        m, k = contacts.table[i, 4], contacts.table[i, 5]
+        m, k, other = contacts.table[i, 4], contacts.table[i, 5], contacts.table[i, 8]
         if kind == USER_DEFINED:
             start = copy_rows(inputs, start, m, nv, A, row)
             for r in range(m):
@@ -145,18 +149,24 @@ def contact_rows(bodies: Bodies, contacts: ContactTable, A, b, J):
             else:
                 p = point
         if kind != FLAT:
-            frame_jacobian(bodies, joint, p, k, J, force)
+            frame_jacobian(bodies, joint, p, k, J, force, other)
         if not contacts.same_rows:
-            frame_jacobian(bodies, joint, p, m, A, row)
-        _, drift = point_velocity(bodies, joint, p)
+            frame_jacobian(bodies, joint, p, m, A, row, other)
+        v, drift = point_velocity(bodies, joint, p)
+        angular_drift = row_part(bodies.drift, joint, 3)
         if kind in (POINT, WHEEL):  # it rolls: its lowest point moves on the body
             drift = plus(drift, times(radius, cross(omega, minus(cross(omega, up), up_rate))))
-        if kind == DRIVEN_FRAME:
+        if kind == CONNECTION:
+            v_other, drift_other = point_velocity(bodies, other, p)
+            omega_other = row_part(bodies.velocity, other, 3)
+            drift = minus(drift, plus(drift_other, cross(omega_other, minus(v, v_other))))
+            angular_drift = minus(angular_drift, row_part(bodies.drift, other, 3))
+        if contacts.table[i, 7] == 3:
             drift = minus(drift, (inputs[start], inputs[start + 1], inputs[start + 2]))
             start += 3
         b[row], b[row + 1], b[row + 2] = times(-1.0, drift)
         if m == 6:
-            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, row_part(bodies.drift, joint, 3))
+            b[row + 3], b[row + 4], b[row + 5] = times(-1.0, angular_drift)
         row, force = row + m, force + k
     force = 0
     for i in range(contacts.table.shape[0]):

@@ -27,13 +27,12 @@ from floatbase.dynamics import (
     PointContact,
     RollingWheel,
 )
-from floatbase.dynamics._compiled import FrameMotion
+from floatbase.dynamics._compiled import Acceleration, FrameConnection, FrameMotion
 from floatbase.friction import FrictionPolyhedron
 from floatbase.objectives import AxisTask
 from floatbase.robots import Robot
 
-# of contacts; the last two have numbers in each tick's inputs
-POINT, FLAT, WHEEL, FIXED_FRAME, DRIVEN_FRAME, USER_DEFINED = range(6)
+POINT, FLAT, WHEEL, FRAME, CONNECTION, USER_DEFINED = range(6)  # kinds of contacts
 CONTACT_KINDS: dict[type, int] = {PointContact: POINT, FlatFootContact: FLAT, RollingWheel: WHEEL}
 QDD, TAU, FORCES = range(len(BLOCKS))
 CAPTURE_POINT = len(BLOCKS)  # of a group of rows that the tick computes itself
@@ -54,9 +53,21 @@ PolyhedronOptions: TypeAlias = tuple[int, bool, float]
 
 def contact_kind(contact: MotionConstraint) -> int:
     """Return the kind of a contact in the tables of the tick."""
-    if type(contact) is LinearConstraint and type(contact.function) is FrameMotion:
-        return FIXED_FRAME if contact.function.acceleration is None else DRIVEN_FRAME
+    if type(contact) is LinearConstraint:
+        kinds = {FrameMotion: FRAME, FrameConnection: CONNECTION}
+        return kinds.get(type(contact.function), USER_DEFINED)
     return CONTACT_KINDS.get(type(contact), USER_DEFINED)
+
+
+def acceleration_of(contact: MotionConstraint) -> Acceleration:
+    """Return the acceleration that the rows of a contact prescribe; the tick's inputs contain it.
+
+    The inputs contain all rows of user-defined contacts.
+    """
+    if contact_kind(contact) == USER_DEFINED:
+        return None
+    part: Any = contact.function if isinstance(contact, LinearConstraint) else contact
+    return cast(Acceleration, getattr(part, "acceleration", None))
 
 
 def soft_contact_task(problem: Problem) -> ContactMotionTask | None:
@@ -65,7 +76,8 @@ def soft_contact_task(problem: Problem) -> ContactMotionTask | None:
     rigid = [each.contact for each in problem.contacts if isinstance(each, SoftConstraint)]
     if len(tasks) != 1 or len(rigid) < len(problem.contacts) or list(tasks[0].contacts) != rigid:
         return None
-    return tasks[0] if all(contact_kind(each) < DRIVEN_FRAME for each in rigid) else None
+    fixed = [contact_kind(c) != USER_DEFINED and acceleration_of(c) is None for c in rigid]
+    return tasks[0] if all(fixed) else None
 
 
 @lru_cache(maxsize=16)
@@ -138,7 +150,7 @@ def contact_numbers(contacts: Indices, nv: int) -> int:
     """Return how many of a tick's inputs belong to contacts. contacts: table of `ContactTable`."""
     user = contacts[contacts[:, 1] == USER_DEFINED]
     matrices = sum(m * (nv + 1) + k * nv + 3 * n for n, m, k in user[:, 3:6])
-    return int(matrices + 3 * np.sum(contacts[:, 1] == DRIVEN_FRAME))
+    return int(matrices + np.sum(contacts[:, 7]))
 
 
 def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array]:
@@ -151,7 +163,7 @@ def _pack_joint_limits(limits: JointLimits | None, d: int) -> tuple[Array, Array
 
 
 def _pack_contacts(problem: Problem, soft: ContactMotionTask | None) -> tuple[Any, ...]:
-    """Return contacts (C, 7), frames (C, 19) and points (P, 3), and cones (P (F + 1), 5).
+    """Return contacts (C, 9), frames (C, 19) and points (P, 3), and cones (P (F + 1), 5).
 
     The first two arrays are those of `kinematics.ContactTable`, the last is `Inequalities.cones`.
     """
@@ -161,7 +173,7 @@ def _pack_contacts(problem: Problem, soft: ContactMotionTask | None) -> tuple[An
         for contact in (problem.contacts if soft is None else soft.contacts)
     ]
     table, frames, points, cones = zip(*found, strict=True) if found else ((), (), (), ())
-    tables = np.array(table, np.int64).reshape(-1, 7)
+    tables = np.array(table, np.int64).reshape(-1, 9)
     tables[:, 2] = np.cumsum(tables[:, 3]) - tables[:, 3]
     return tables, *(
         np.concatenate([np.zeros((0, width)), *parts])
@@ -179,7 +191,7 @@ def _pack_contact(
     cones: Array = np.zeros((0, 5))
     if isinstance(contact, FrictionContact):
         n, cones = len(contact.point_names), _cones(contact, options)
-    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k, 0)
+    row = (0, USER_DEFINED, 0, n, len(contact.row_names), contact.k, 0, 0, 0)
     return row, np.zeros((1, _FRAME_SIZE)), np.zeros((n, 3)), cones
 
 
@@ -188,18 +200,21 @@ def _pack_builtin_contact(
     robot: Robot, contact: Any, options: PolyhedronOptions
 ) -> tuple[tuple[int, ...], Array, Array, Array]:
     """Return one contact of a built-in class, as `_pack_contact` does."""
-    kind, surface = contact_kind(contact), np.zeros(7)
+    kind, surface, other = contact_kind(contact), np.zeros(7), 0
     cones: Array = np.zeros((0, 5))
     points: Array = np.zeros((0, 3))
-    if kind in (FIXED_FRAME, DRIVEN_FRAME):
+    if kind in (FRAME, CONNECTION):
         frame = contact.function.frame
+        other = _frame_placement(robot, getattr(contact.function, "other", "universe"))[0]
     else:
         frame, cones = contact.frame, _cones(contact, options)
         points = np.reshape(contact.corners if kind == FLAT else contact.centre, (-1, 3))
         surface[:3], surface[3] = contact.normal, getattr(contact, "radius", 0.0)
         surface[4:] = getattr(contact, "axis", 0.0)
     joint, pose = _frame_placement(robot, frame)
-    row = (joint, kind, 0, len(points), len(contact.row_names), contact.k, 0)
+    n_inputs = 0 if acceleration_of(contact) is None else 3
+    numbers = len(points), len(contact.row_names), contact.k
+    row = (joint, kind, 0, *numbers, 0, n_inputs, other)
     return row, np.concatenate([pose, surface])[None], points, cones
 
 

@@ -74,7 +74,7 @@ def unpack(nv, sizes, int_tables, float_tables, inputs, counters, workspace, sat
     ints, floats = counters[:1], counters[1:]
     ints[0], floats[0] = 0, 0
     tree = read_matrix(int_tables, ints, n, 6)
-    contact_table = read_matrix(int_tables, ints, n_contacts, 7)
+    contact_table = read_matrix(int_tables, ints, n_contacts, 9)
     task_table = read_matrix(int_tables, ints, n_tasks, 7)
     terms = read_vector(float_tables, floats, N_TERMS)
     links = read_matrix(float_tables, floats, n, MASS + 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias, cast
 
@@ -16,8 +17,8 @@ from floatbase.control.limits import BLOCKS, LinearInequality
 from floatbase.control.problem import Problem, residual_of
 from floatbase.control.tick.problem_arrays import (
     CAPTURE_POINT,
-    DRIVEN_FRAME,
     USER_DEFINED,
+    acceleration_of,
     contact_kind,
     soft_contact_task,
 )
@@ -25,9 +26,12 @@ from floatbase.control.tick.targets import compiled_rows
 from floatbase.dynamics import (
     EquationsOfMotion,
     FrictionContact,
+    LinearConstraint,
+    MotionConstraint,
     constraint_and_jacobian,
     equations_of_motion,
 )
+from floatbase.dynamics._compiled import acceleration_at
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -45,7 +49,7 @@ class TickInputs(NamedTuple):
     # and rows
     packed: Array
     n_user_rows: int = 0  # of all user-defined tasks
-    # A, b and J of each user-defined contact, accelerations of each driven frame
+    # A, b and J of each user-defined contact, acceleration of each other one that prescribes it
     contacts: Sequence[tuple[Array, ...]] = ()
     # weight and residual of user-defined tasks, by their index in the problem
     residuals: Mapping[int, tuple[float, Affine]] = MappingProxyType({})
@@ -67,14 +71,16 @@ class UserTerms:
             for i, task in enumerate(problem.tasks)
             if not compiled_rows(task) and task is not soft
         ]
-        kinds = [(contact, contact_kind(contact)) for contact in problem.contacts]
-        self._contacts = [each for each in kinds if each[1] >= DRIVEN_FRAME and soft is None]
+        rigid = problem.contacts if soft is None else ()
+        self._contacts = [contact for contact in rigid if _has_inputs(contact)]
         self._inequalities = [
             (each, _fixed_group(problem, each))
             for each in self._limits.all_inequalities(problem.contacts)
         ]
         # of the terms that need a state
-        self.names = [contact.name for contact, kind in self._contacts if kind == USER_DEFINED]
+        self.names = [
+            contact.name for contact in self._contacts if contact_kind(contact) == USER_DEFINED
+        ]
         self.names += [task.name for _, task, _ in self._tasks]
         self.names += [each.name for each, fixed in self._inequalities if fixed is None]
         self.any = bool(self.names or self._contacts)
@@ -110,9 +116,9 @@ class UserTerms:
         if self.names:
             state = State.unchecked(problem.robot, q, v)  # the compiled tick checks q and v
             eom = EquationsOfMotion(state, problem.contacts, t)
-        for contact, kind in self._contacts:
-            if kind == DRIVEN_FRAME:
-                contacts.append((cast(Any, contact).function.acceleration_at(t),))
+        for contact in self._contacts:
+            if contact_kind(contact) != USER_DEFINED:
+                contacts.append((acceleration_at(acceleration_of(contact), t),))
                 packed += contacts[-1]
                 continue
             A, b, J = constraint_and_jacobian(contact, eom.state, t)
@@ -140,16 +146,29 @@ class UserTerms:
         if not self._contacts:
             return equations_of_motion(state, contacts, t)
         given, rows = iter(inputs.contacts), list[tuple[Array, ...]]()
-        for contact, kind in ((each, contact_kind(each)) for each in contacts):
-            if kind < DRIVEN_FRAME:
-                rows.append(constraint_and_jacobian(contact, state, t))
-            elif kind == USER_DEFINED:
-                rows.append(next(given))
+        for contact in contacts:
+            inputs_of_contact = next(given) if _has_inputs(contact) else ()
+            if contact_kind(contact) == USER_DEFINED:
+                rows.append(inputs_of_contact)
             else:
-                A, b = cast(Any, contact).function.rows(state, *next(given))
-                rows.append((A, b, A))
+                constant = _with_acceleration(contact, *inputs_of_contact)
+                rows.append(constraint_and_jacobian(constant, state, t))
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
         return EquationsOfMotion(state, contacts, t, A=A, b=b, J=J)
+
+
+def _has_inputs(contact: MotionConstraint) -> bool:
+    """Return whether the tick's inputs have numbers of a contact."""
+    return contact_kind(contact) == USER_DEFINED or acceleration_of(contact) is not None
+
+
+def _with_acceleration(contact: Any, *acceleration: Array) -> MotionConstraint:
+    """Return a contact with a constant acceleration, or the contact itself if none is given."""
+    for value in acceleration:
+        is_linear = isinstance(contact, LinearConstraint)
+        part = replace(contact.function if is_linear else contact, acceleration=value)
+        contact = replace(contact, function=part) if is_linear else part
+    return cast(MotionConstraint, contact)
 
 
 def _group(each: LinearInequality, eom: EquationsOfMotion, t: float = 0.0) -> Group:

@@ -12,7 +12,6 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array, as_integer
 from floatbase.actuators import FirstOrderLag
-from floatbase.control import Command
 from floatbase.errors import unknown_name
 from floatbase.lessons.lesson06 import state_with_feet_at
 from floatbase.lessons.lessonA import elliptic_rotation
@@ -66,34 +65,25 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
     return np.asarray(np.cos(angle) * normal + np.sin(angle) * aside / np.linalg.norm(aside))
 
 
-class TwistController:
-    """Controller that stores its planned accelerations and softens contacts it cannot hold."""
-
-    def __init__(
-        self, state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch
-    ):
-        path = elliptic_rotation(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.direction)
-        tasks: list[Task] = [
-            fb.CoMTask(state.com, kp=KP_COM),
-            fb.OrientationTask("base", path, kp=KP_BASE),
-            fb.PostureTask(state.q),
-        ]
-        self.contacts, self.planned = contacts, list[Array]()
-        self._controller = fb.WholeBodyController(
-            state.robot,
-            contacts,
-            tasks,
-            facets=FACETS,
-            modify_qp=None if mismatch.is_exact else mismatch,
-            on_infeasible="soften",
-            joint_limits=None,  # the record shows what the faults do, down to the joints' stops
-        )
-
-    def __call__(self, q: Array, v: Array, t: float) -> Command:
-        """Return the command for configuration q and velocity v."""
-        command = self._controller(q, v, t)
-        self.planned.append(command.qdd)
-        return command
+def twist_controller(
+    state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch
+) -> fb.WholeBodyController:
+    """Return a controller that twists the robot and softens contacts it cannot hold."""
+    path = elliptic_rotation(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.direction)
+    tasks: list[Task] = [
+        fb.CoMTask(state.com, kp=KP_COM),
+        fb.OrientationTask("base", path, kp=KP_BASE),
+        fb.PostureTask(state.q),
+    ]
+    return fb.WholeBodyController(
+        state.robot,
+        contacts,
+        tasks,
+        facets=FACETS,
+        modify_qp=None if mismatch.is_exact else mismatch,
+        on_infeasible="soften",
+        joint_limits=None,  # the record shows what the faults do, down to the joints' stops
+    )
 
 
 class SwappedMotors:
@@ -159,13 +149,12 @@ def record_box(
     mismatch = ModelMismatch(
         mass=injected_fault.size if fault == "mass" else 1.0, drift=fault != "drift"
     )
-    pilot = TwistController(state, contacts, twist, mismatch)
+    pilot = twist_controller(state, contacts, twist, mismatch)
     actuators = faulty_motors(robot, injected_fault, pilot(state.q, state.v, 0.0).tau)
-    pilot.planned.clear()
     sim = fb.Simulation(robot, fb.Ground(mu, normal=twist.normal))
     sim.reset(state)
     record = fb.rollout(sim, pilot, seconds, pushes, PERIOD, actuators)
-    return black_box_of(name, record, np.array(pilot.planned[: len(record)]))
+    return black_box_of(name, record)
 
 
 def faulty_motors(robot: fb.Robot, injected_fault: InjectedFault, tau: Array) -> Actuators | None:
@@ -190,12 +179,12 @@ def standing_on(robot: fb.Robot, normal: Array) -> fb.State:
     return state_with_feet_at(robot, home.q[:3], centres)
 
 
-def black_box_of(name: str, record: Rollout, qdd: Array) -> BlackBox:
-    """Return the part of a record that an investigation may use; qdd: planned, shape (n, nv)."""
+def black_box_of(name: str, record: Rollout) -> BlackBox:
+    """Return the part of a record that an investigation may use."""
     return BlackBox(
         name, record.robot, record.contacts, record.time, record.q, record.v, record.measured,
         record.tau_desired,
-        record.planned, qdd,
+        record.planned, np.array(record.planned_qdd),
     )  # fmt: skip
 
 

@@ -58,13 +58,13 @@ class Plane(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """Several planes that are solid below, such as the two sides of a valley."""
+    """Several planes that are solid below, such as the two sides of a valley, or a wall."""
 
     planes: tuple[Plane, ...]
 
     def height(self, point: Array) -> float:
         """Return the height of the ground below or above a point."""
-        return max(plane.height(point) for plane in self.planes)
+        return max(plane.height(point) for plane in self.planes if plane.normal[2] >= MIN_VERTICAL)
 
     def lines(self, colour: RGB, around: Array | None = None) -> Item:
         """Draw the visible parts of all grids, around the origin."""

@@ -19,7 +19,7 @@ PACKAGES = {
     "floatbase.friction": "friction cones, polyhedra and contact wrenches",
     "floatbase.qp": "quadratic programs and their solvers",
     "floatbase.control": "the whole-body controller",
-    "floatbase.actuators": "hydraulic cylinders, lags and delays",
+    "floatbase.actuators": "motor drivers, lags, delays and hydraulic cylinders",
     "floatbase.simulation": "MuJoCo, rollouts, pushes and parameter sweeps",
     "floatbase.behaviours": "standing, gaits and walking",
     "floatbase.viewer": "3-D pictures, recordings, films and plots",
@@ -29,6 +29,16 @@ PACKAGES = {
     "floatbase.linear_algebra": "ranks and null spaces",
     "floatbase.errors": "exceptions",
 }
+# what the course derives, and a controller does not need: at the end of the page of its package
+ALGEBRA = {
+    "accelerations_from_torques", "argmin_coordinates", "bias_forces", "com_wrench_map",
+    "contact_space", "coriolis_matrix", "cost_on_space", "delassus_matrix", "desired_wrench",
+    "dimensions", "feasible_space", "FeasibleSpace", "force_bias", "forces_from_torques",
+    "grasp_matrix", "internal_forces", "minimum_norm_coordinates", "minimum_norm_pullback",
+    "motion_matrix", "net_force_matrix", "net_moment_matrix", "normal_bias", "partial_minimum",
+    "tangential_bias", "torque_force_matrix", "torque_force_space", "torques_from_forces",
+    "TorquesFromForces", "undetermined_forces", "view_from_rotating_frame", "wrench_objective",
+}  # fmt: skip
 
 
 @cache

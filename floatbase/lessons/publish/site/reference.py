@@ -12,7 +12,7 @@ from sphinx.ext.napoleon.docstring import NumpyDocstring
 from sphinx.util.docstrings import prepare_docstring
 
 import floatbase
-from floatbase.lessons.publish.site.addresses import PACKAGES, addresses, exported, members
+from floatbase.lessons.publish.site.addresses import ALGEBRA, PACKAGES, addresses, exported, members
 from floatbase.lessons.publish.site.references import anchor_of, is_known
 
 _MAX_VALUE_LENGTH = 90  # characters of a constant's value that are shown
@@ -44,13 +44,18 @@ def _package_page(package: str) -> str:
         return head + _summary_table(
             [addresses()[name].removeprefix("floatbase.") for name in floatbase.__all__]
         )
-    things = [(f"{package}.{name}", value) for name, value in exported(package)]
-    listed = [
-        address.removeprefix(f"{package}.")
-        for address, value in things
-        if _is_code(value) or isinstance(value, ModuleType)
-    ]
-    return head + _summary_table(listed) + "\n".join(_entry(*thing) for thing in things)
+    public = exported(package)
+    text = head + _entries(package, [thing for thing in public if thing[0] not in ALGEBRA])
+    if algebra := [thing for thing in public if thing[0] in ALGEBRA]:
+        text += "\nAlgebra of the course\n---------------------\n\n" + _entries(package, algebra)
+    return text
+
+
+def _entries(package: str, things: list[tuple[str, Any]]) -> str:
+    """Write a table of public names, and the entry of each."""
+    listed = [name for name, value in things if _is_code(value) or isinstance(value, ModuleType)]
+    entries = [_entry(f"{package}.{name}", value) for name, value in things]
+    return _summary_table(listed) + "\n".join(entries)
 
 
 def _is_code(value: Any) -> bool:
