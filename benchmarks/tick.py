@@ -103,11 +103,10 @@ def own(n: int) -> Rows:
     for name in ROBOTS:
         robot = fb.load(name)
         at, feet = robot.standing(), fb.Contacts.feet(robot)
-        joint = np.eye(robot.nv)[-1:]
         tasks = fb.standing_tasks(at)
         mine = [OwnCoM(at.com), *tasks[1:]]
         held = feet + fb.Contacts(
-            [LinearConstraint("held", 1, lambda state, t, joint=joint: (joint, np.zeros(1)))]
+            [LinearConstraint("held", 1, lambda s, t: (np.eye(s.robot.nv)[-1:], np.zeros(1)))]
         )
         controllers = [
             fb.WholeBodyController(robot, feet, tasks, backend="compiled"),
@@ -152,12 +151,11 @@ def added_inequalities(robot: fb.Robot) -> dict[str, LinearInequality]:
 def added_contacts(robot: fb.Robot) -> dict[str, fb.Contacts]:
     """Return contacts with each kind of constraint; wheels replace the feet."""
     feet, frame = fb.Contacts.feet(robot), "base"
-    wheels = [RollingWheel(foot.frame, [0.0, 1.0, 0.0], 0.02) for foot in robot.feet]
     return {
         "fixed_frame": feet + fb.Contacts([fixed_frame(frame)]),
         "moving_frame": feet + fb.Contacts([moving_frame(frame, lambda t: np.zeros(3))]),
         "rigid_between": feet + fb.Contacts([rigid_between(robot.feet[0].frame, frame)]),
-        "RollingWheel": fb.Contacts(wheels),
+        "RollingWheel": fb.Contacts([RollingWheel(f.frame, [0, 1, 0], 0.02) for f in robot.feet]),
     }
 
 
