@@ -247,7 +247,7 @@ class Jump:
     ):
         self._robot = as_instance("robot", robot, Robot)
         self._all_contacts = as_instance("contacts", contacts, Contacts)
-        check_options(type(self).__name__, options)
+        check_options(type(self), options)
         if not contacts.names:
             raise InputError("contacts must have at least one foot, because a jump pushes off.")
         self._standing = standing = robot.standing()

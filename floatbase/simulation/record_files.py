@@ -69,6 +69,7 @@ def read_record(path: str | Path, robot: Robot | None) -> dict[str, Any]:
                     f"{_FORMAT!r}. Load the file with the version that saved it."
                 )
             values = _rollout_fields(json.loads(header, object_hook=_from_json), arrays)
+            _check_shapes(path, values)
         except (OSError, InputError):
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json raise many kinds
@@ -102,6 +103,20 @@ def _rollout_fields(header: dict[str, Any], arrays: dict[str, Any]) -> dict[str,
         "pushes": tuple(header["pushes"]),
         "targets": MappingProxyType(targets),
     }
+
+
+def _check_shapes(path: str | Path, values: dict[str, Any]) -> None:
+    """Raise `InputError` for an array that does not fit the robot, the contacts and the times."""
+    robot, contacts, n = values["robot"], values["contacts"], len(values["time"])
+    widths = dict(time=(), q=(robot.nq,), v=(robot.nv,), tau=(robot.d,), tau_desired=(robot.d,))
+    widths |= dict.fromkeys(("planned", "measured"), (contacts.k,))
+    widths["foot_positions"] = (contacts.n_points, 3)
+    for name, width in widths.items():
+        if (shape := np.shape(values[name])) != (n, *width):
+            raise InputError(
+                f"{path} is damaged: {name} has the shape {shape}, but {n} rows of this robot have "
+                f"the shape {(n, *width)}. Save the run again."
+            )
 
 
 def _as_json(value: Any) -> Any:

@@ -20,7 +20,14 @@ from floatbase._validation import (
     short_repr,
 )
 from floatbase.dynamics import Contacts
-from floatbase.errors import FloatbaseError, InputError, SimulationWarning, warn
+from floatbase.errors import (
+    FloatbaseError,
+    InfeasibleError,
+    InputError,
+    SimulationWarning,
+    SolverError,
+    warn,
+)
 from floatbase.simulation.after_fall import record_settling
 from floatbase.simulation.physics import Simulation
 from floatbase.simulation.push import Push, active_pushes, as_pushes
@@ -118,9 +125,10 @@ def rollout(
     Returns
     -------
     Rollout
-        One row for each control step. A fall, a divergence of the simulation, an error of this
-        package raised by the controller, or torques that are not finite numbers end the rollout.
-        The rows up to that time are returned, and `outcome` gives the reason.
+        One row for each control step. A fall, a divergence of the simulation, an `InfeasibleError`
+        or a `SolverError` of the controller, or torques that are not finite numbers end the
+        rollout. The rows up to that time are returned, and `outcome` gives the reason. Other errors
+        in the controller are raised.
 
     Raises
     ------
@@ -189,7 +197,7 @@ def rollout(
                 if measure is not None:
                     measure(sim.torques(), sim.contact_forces())
                 command = controller(q, v, t)
-            except FloatbaseError as error:
+            except (InfeasibleError, SolverError) as error:
                 return end("controller failed", error)
             previous, stance = stance, _current_stance(sim, controller)
             if stance is not previous:

@@ -127,10 +127,19 @@ def test_other_files_and_robots_are_refused(tmp_path: Path) -> None:
     with raises(InputError, "run.npz", "ur5"):
         fb.Rollout.load(path, robot=judges.load("ur5"))
     newer = json.dumps(header | {"format": "floatbase rollout 2"})
-    for named, change in ((2, {"header": np.array(newer)}), ("damaged", {"header": np.zeros(3)})):
+    changes = [
+        ("2", {"header": np.array(newer)}),
+        ("damaged", {"header": np.zeros(3)}),
+        ("q ", {"q": arrays["q"][:-1]}),
+        ("tau ", {"tau": arrays["tau"][:, :-1]}),
+    ]
+    for named, change in changes:
         np.savez(path, **arrays | change)
         with raises(InputError, "run.npz", named):
             fb.Rollout.load(path)
+    np.savez(path, **{name: rows for name, rows in arrays.items() if name != "measured"})
+    with raises(InputError, "run.npz", "damaged"):
+        fb.Rollout.load(path)
     for wrong in (b"", b"junk", content[: len(content) // 2], content.replace(b"PK", b"PQ")):
         path.write_bytes(wrong)
         with raises(InputError, "run.npz"):

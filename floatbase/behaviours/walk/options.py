@@ -27,7 +27,7 @@ from floatbase.behaviours.walk.gait import Gait, check_always_supported
 from floatbase.behaviours.walk.swing import Swing, SwingPath
 from floatbase.control import WholeBodyController
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.errors import InputError
+from floatbase.errors import InputError, check_arguments
 from floatbase.objectives import Task
 from floatbase.robots import State
 
@@ -146,15 +146,11 @@ def flat_foot_names(contacts: Contacts) -> set[str]:
     return {contact.name for contact in contacts if isinstance(contact, FlatFootContact)}
 
 
-def check_options(behaviour: str, options: Iterable[str]) -> None:
-    """Raise `InputError` for an option that `WholeBodyController` does not have."""
+def check_options(behaviour: type, options: Iterable[str]) -> None:
+    """Raise `UnknownArgumentError` for an option that neither it nor `WholeBodyController` has."""
     _, _, _, *known = inspect.signature(WholeBodyController).parameters  # robot, contacts, tasks
-    for name in options:
-        if name not in known:
-            raise InputError(
-                f"{behaviour} has no option {name!r}. Besides its own options, it accepts those of "
-                f"WholeBodyController: {', '.join(known)}."
-            )
+    own = inspect.signature(behaviour).parameters.keys() - {"options"}
+    check_arguments(behaviour.__name__, options, {*own, *known})
 
 
 def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:

@@ -202,7 +202,7 @@ class Walk:
         self._velocity = as_velocity(velocity)
         self._yaw_rate = as_yaw_rate(yaw_rate)
         self._pose = BodyPose.checked(height, pitch)
-        check_options(type(self).__name__, options)
+        check_options(type(self), options)
         self._options = WalkOptions.checked(
             self._all_contacts,
             clearance=clearance,
