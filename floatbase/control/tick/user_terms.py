@@ -158,7 +158,7 @@ class UserTerms:
 
 
 def _has_inputs(contact: MotionConstraint) -> bool:
-    """Return whether the tick's inputs contain numbers for a contact."""
+    """Return whether the tick's inputs have numbers of a contact."""
     return contact_kind(contact) == USER_DEFINED or acceleration_of(contact) is not None
 
 
