@@ -320,9 +320,9 @@ def _shape_matches(found: tuple[int, ...], shape: tuple[int | None, ...]) -> boo
 
 
 def one_or_each(name: str, value: object, n: int | None, shape: tuple[int, ...]) -> Array:
-    """Return an array of this shape for each of n; they may be equal, and given once.
+    """Return n arrays of this shape, from n arrays or from one array for all.
 
-    n: None for any number; a value that is given once is then returned once.
+    If n is None, any number of arrays is accepted, and one array stays one array.
     """
     array = numeric_copy(value)
     for_each = array is not None and array.ndim > len(shape)

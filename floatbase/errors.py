@@ -202,7 +202,7 @@ def explain_arguments(namespace: dict[str, Any], without: Collection[str] = ()) 
 
 
 def _explained(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function that names unknown arguments, and is otherwise this function."""
+    """Return the function with an error that names unknown arguments."""
 
     @wraps(function)
     def explained(*args: Any, **kwargs: Any) -> Any:

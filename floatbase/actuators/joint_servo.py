@@ -34,7 +34,7 @@ def _as_gains(name: str, value: npt.ArrayLike, d: int | None = None) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class JointTargets(Value):
-    """What a motor driver takes: positions, velocities, gains and feedforward torques.
+    """What motor drivers receive: positions, velocities, gains and feedforward torques.
 
     Parameters
     ----------
@@ -100,14 +100,15 @@ class JointServo:
 
     Notes
     -----
-    The targets integrate the plan. They do not begin at the measured state in each control step:
-    such targets would differ from the measurement only by the plan of a few milliseconds, and the
-    spring would do nothing. Integrated over seconds, the plan acts as integral feedback. A load
-    that the controller does not know about makes the base sink, so the plan accelerates it upwards
-    and the targets rise until the springs carry the load.
+    The targets integrate the plan. They do not begin at the measured state in each control step.
+    Such targets would differ from the measurement only by the motion planned for a few
+    milliseconds, and the spring would do almost nothing. Integrated over seconds, the plan acts as
+    integral feedback. An unknown load makes the base sink, so the plan accelerates the base
+    upwards, and the targets rise until the springs carry the load.
 
-    The leak bounds this integral and forgets impacts, which no plan contains. The targets are
-    limited as well: neither the spring nor the damper alone can ask for more than the torque limit.
+    The leak bounds this integral and removes the effect of impacts, which no plan contains. The
+    targets are limited as well, so that neither the spring nor the damper alone exceeds the torque
+    limit.
 
     Examples
     --------

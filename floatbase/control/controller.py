@@ -96,9 +96,9 @@ class WholeBodyController:
     joint_limits : JointLimits or {"robot"}, optional
         Position, velocity and acceleration limits of the joints. "robot" uses those of the URDF,
         `JointLimits.of(robot, torque_limits=torque_limits)`, as soft constraints with a weight of
-        100. This weight is not that of a task: a violation costs weight · violation, and the
+        100. This weight differs from that of a task: a violation costs weight · violation, and the
         residual of a task costs ½ weight · residual². A limit yields if torques or contacts oppose
-        it, or a task with a large residual, such as one whose target is far out of reach. None
+        the limit, or if a task has a large residual because its target is far out of reach. None
         switches the limits off.
     normal_force_weight : float, optional
         None makes the bounds of normal forces hard. A number makes them soft: their violation

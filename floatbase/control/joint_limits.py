@@ -28,7 +28,7 @@ from floatbase.robots import Robot, State
 from floatbase.robots._checks import as_torque_limits
 from floatbase.robots._checks import joint_limits as position_limits
 
-# per rad/s² or m/s²: outweighs a task of weight 10 up to a residual of 10 m/s². With a much
+# per rad/s² or m/s²: outweighs a task of weight 10 with a residual below 10 m/s². With a much
 # larger weight, a supporting leg lets the robot fall rather than touch a joint's stop
 _WEIGHT = 100.0
 # fraction of a motor's acceleration in the standing posture that a joint can rely on for braking:
@@ -107,10 +107,10 @@ class JointLimits(Value):
     weight : float, optional
         Weight of a violation in the objective [units of the objective per rad/s² or m/s²]. The
         penalty is linear: violation · weight. The cost of a task is quadratic, ½ weight ·
-        residual². A limit therefore yields to torques and contacts that oppose it, and to a task
-        whose weight · residual is larger than the limit's weight, such as a task of weight 10 with
-        a residual of more than 10 m/s². None makes the limits hard: if they cannot hold, the QP has
-        no solution.
+        residual². A limit can therefore yield to a task whose weight · residual exceeds the limit's
+        weight, such as a task of weight 10 with a residual of more than 10 m/s². A limit also
+        yields to torques and contacts that oppose it. None makes the limits hard: if they cannot
+        hold, the QP has no solution.
 
     Raises
     ------

@@ -260,7 +260,7 @@ def moving_frame(frame: str, acceleration: Acceleration) -> LinearConstraint:
     Note 6 of the course text.
     """
     if acceleration is None:
-        raise InputError("acceleration is None. Give an array or a function, or use fixed_frame.")
+        raise InputError("acceleration is None. Pass an array or a function, or use fixed_frame.")
     function = FrameMotion(frame, as_acceleration("acceleration", acceleration))
     return LinearConstraint(f"drive of {as_string('frame', frame)}", 3, function)
 

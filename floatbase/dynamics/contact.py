@@ -214,7 +214,7 @@ class PointContact(SinglePointContact):
         Centre of the ball in the frame [m].
     acceleration : array_like, shape (3,), or callable, optional
         Acceleration a of the ground in the world frame [m/s²], constant or as a function
-        `acceleration(t)` of the time [s]; then b = a - J̇ q̇. The ground must not turn.
+        `acceleration(t)` of the time [s]; then b = a - J̇ q̇. The ground must not rotate.
     """
 
     normal: Array = field(default_factory=lambda: UP, metadata=checked(unit_vector))

@@ -39,8 +39,8 @@ Target: TypeAlias = npt.ArrayLike | Callable[[float], npt.ArrayLike | tuple[npt.
 
 Shape: TypeAlias = tuple[int | str, ...]
 Shapes: TypeAlias = Mapping[str, Shape]
-# s, of finite differences: a path at 10 Hz has errors of 3 %, and rounding 1e-9 m/s². Targets that
-# jump up to a thousand times a second are recognised.
+# s, of finite differences: at 10 Hz, the error is 3 %, and rounding adds 1e-9 m/s². Targets that
+# jump up to a thousand times a second count as targets at rest
 _TIME_STEP = 5e-4
 _AT_REST = 1e-12  # m or rad: a target that moves less in a time step is at rest, up to rounding
 
@@ -215,9 +215,9 @@ class TargetTask(Value):
     ) -> list[Array]:
         """Return the derivatives of a target by finite differences of its function.
 
-        They come from one side of t, on which the function is smoother, so that jumps and kinks do
-        not count. A side on which the function is not defined is left out. A target that has the
-        same value one step away is at rest. So is one whose function does not depend on t alone.
+        The differences come from the side of t on which the function is smoother, so that jumps and
+        kinks have no effect. A side on which the function is not defined is left out. A target that
+        has the same value one step away is at rest. So is a target that does not depend on t alone.
         """
         (name, shape), *rates = shapes.items()
 

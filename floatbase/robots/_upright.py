@@ -1,4 +1,4 @@
-"""Robots that are upside down, often because of a quaternion in another order."""
+"""Detection of robots that are upside down, often because of a quaternion in another order."""
 
 from __future__ import annotations
 

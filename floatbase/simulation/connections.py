@@ -51,7 +51,7 @@ class Connections:
         self._welds = [model.equality(name).id for name in self.contacts.names]
 
     def fix(self, model: mujoco.MjModel, data: mujoco.MjData, state: State) -> None:
-        """Let the connections keep the poses of a state, which `data` is in."""
+        """Fix the connected frames in the poses of a state; `data` is in this state."""
         for weld, contact in zip(self._welds, self.contacts, strict=True):
             pair, pose = (model.eq_obj1id[weld], model.eq_obj2id[weld]), model.eq_data[weld]
             contact.constraint(state)  # raises an error if both frames belong to one link
@@ -70,7 +70,7 @@ class Connections:
         welds, forces = data.efc_id[: data.ne], data.efc_force[: data.ne]
         wrenches = np.array([forces[welds == weld] for weld in self._welds]).reshape(-1, 6)
         for weld, wrench in zip(self._welds, wrenches, strict=True):
-            # MuJoCo measures turns by the vector of a quaternion, half of the angle
+            # MuJoCo measures rotations by the vector part of a quaternion, half of the angle
             axes = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
             wrench[3:] = 0.5 * axes @ wrench[3:]
         return wrenches.ravel()

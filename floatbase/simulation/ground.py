@@ -90,7 +90,7 @@ class Ground(Value):
     ----------
     mu : float or array_like, shape (n,), optional
         Coefficient of friction between the ground and the feet, positive: one number for all, or
-        one for each of n planes [-]. Boxes and the links of a fallen robot have the first one.
+        one for each of n planes [-]. Boxes and the links of a fallen robot use the first number.
     normal : array_like, shape (3,) or (n, 3), optional
         Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
         it is normalized.
@@ -102,7 +102,7 @@ class Ground(Value):
     acceleration : array_like, shape (3,), or callable, optional
         Acceleration of the whole ground in the world frame [m/s²], constant or as a function
         `acceleration(t)` of the simulation's time [s]. The ground is at rest at time 0, does not
-        turn, and carries feet and fixed frames along. Planes and boxes are those at time 0.
+        rotate, and carries feet and fixed frames along. Planes and boxes are given at time 0.
 
     Attributes
     ----------

@@ -50,8 +50,9 @@ class MujocoAdapter:
     Raises
     ------
     InputError
-        If the base floats in only one of the two models, if the scene has several such robots, or
-        if a link is in another place because an axis, a zero or a length differs.
+        If the base floats in only one of the two models, if several robots in the scene have joints
+        of these names, or if a link is in another place because an axis, a zero or a length
+        differs.
     UnknownNameError
         If the scene lacks a joint.
 
@@ -147,7 +148,7 @@ class MujocoAdapter:
         return State(self.robot, self.q(data), self.v(data))
 
     def set_state(self, data: mujoco.MjData, state: State) -> None:
-        """Write a state into qpos and qvel. To update positions, call `mujoco.mj_forward`.
+        """Write a state into qpos and qvel. To update all other data, call `mujoco.mj_forward`.
 
         Parameters
         ----------
@@ -182,7 +183,7 @@ class MujocoAdapter:
         self._checked(data).ctrl[controls] = torques / torque_per_control
 
     def _checked(self, data: mujoco.MjData) -> mujoco.MjData:
-        """Return the data of the scene; those of another model would be misread."""
+        """Return the data of the scene; raise `InputError` for data of another model."""
         if data.qpos.size != self._model.nq:
             raise InputError(
                 f"data has {data.qpos.size} entries in qpos, but the model of this adapter has "
@@ -246,7 +247,7 @@ class MujocoAdapter:
         return mount or pin.SE3.Identity()
 
     def _differences(self, mount: pin.SE3) -> list[str]:
-        """Return what differs, but is no reason to refuse the scene."""
+        """Return the differences that are no reason to refuse the scene."""
         robot, model, root = self.robot, self._model, self._root
         is_moving = (model.body_rootid == root) & (model.body_weldid > 0)
         mass = sum(inertia.mass for inertia in robot.model.inertias[1:])
@@ -263,8 +264,8 @@ class MujocoAdapter:
             f"weighs {theirs:.4g} kg instead of {mass:.4g} kg": abs(theirs / mass - 1) > _TOLERANCE,
             f"also has the joints {', '.join(others)}": bool(others),
             f"has weaker motors at {', '.join(weaker)}": bool(weaker),
-            f"has a gravity of {gravity.round(3)} m/s²": pull > _TOLERANCE * robot.gravity,
-            f"stands at {place} m, but targets are relative to its base": not mount.isIdentity(
+            f"is under a gravity of {gravity.round(3)} m/s²": pull > _TOLERANCE * robot.gravity,
+            f"has its base at {place} m, but targets are relative to it": not mount.isIdentity(
                 _LARGEST_DIFFERENCE
             ),
         }
@@ -299,7 +300,7 @@ def _find_joints(robot: Robot, model: mujoco.MjModel, names: Sequence[str] | Non
 
 
 def _find_root(robot: Robot, model: mujoco.MjModel, joints: list[int]) -> int:
-    """Return the body of the scene that carries the robot's tree, with a free joint if needed."""
+    """Return the root body of the robot in the scene; check that it floats if the robot does."""
     free = free_joint(model, joints)  # -1 if the root of the tree has no joint
     is_free = free >= 0 and model.jnt_type[free] == mujoco.mjtJoint.mjJNT_FREE
     if is_free != robot.is_floating:

@@ -47,8 +47,9 @@ class Observed:
         The controller.
     *observers : callable
         Functions observe(q, v, t) -> (q, v), such as `SensorNoise`, `Latency` or your own state
-        estimator. Each gets what the one before it returns; the first gets the true state. One with
-        a method `measure(tau, forces)` also gets torques and contact forces (see `measure`).
+        estimator. The first observer gets the true state, and each other one gets what the observer
+        before it returns. An observer with a method `measure(tau, forces)` also gets torques and
+        contact forces (see `measure`).
 
     Raises
     ------

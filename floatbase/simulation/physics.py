@@ -70,7 +70,7 @@ class Simulation:
         Whether the joint damping and dry friction in the robot's file act, as in
         <dynamics damping="0.1" friction="0.5"/>. The equations and the controllers ignore them.
     contacts : Contacts, optional
-        Contacts of a controller, which the simulation then has besides the feet: point contacts,
+        Contacts of a controller that exist in the simulation, besides the feet: point contacts,
         flat feet and wheels at other frames, fixed frames and rigid connections. A reset fixes the
         frames where they are. The normals and coefficients of friction are those of the ground.
 
@@ -194,7 +194,7 @@ class Simulation:
 
     @property
     def contacts(self) -> Contacts:
-        """The feet, and what the simulation has of its argument `contacts`."""
+        """The feet, and the other contacts that exist in the simulation."""
         return self._contacts
 
     @property
@@ -206,7 +206,8 @@ class Simulation:
     def ground_position(self) -> Array:
         """How far the ground has moved since the last reset, shape (3,), world frame [m].
 
-        MuJoCo's `data` is in the frame of the ground, which falls with its acceleration instead.
+        MuJoCo's `data` is relative to the ground. The acceleration of the ground is subtracted from
+        gravity in MuJoCo's `model`.
         """
         return self._ground_position.copy()
 
@@ -483,7 +484,7 @@ class Simulation:
         Returns
         -------
         bool
-            Whether something acts there. A contact with an acceleration needs a ground with one.
+            Whether the contact exists. A contact with an acceleration needs a ground with one.
         """
         is_moving = getattr(contact, "acceleration", None) is not None
         if contact.name not in self.contacts.names or (

@@ -262,7 +262,7 @@ class Rollout(Value):
         """Compute the largest distance of each contact point from where its stance began.
 
         A point is in stance while the controller's contacts include it. Points that were never in
-        stance have 0. The distance is that on the ground, which may itself move.
+        stance have 0. Distances are relative to the ground, which may move.
 
         Parameters
         ----------

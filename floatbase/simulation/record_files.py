@@ -46,7 +46,7 @@ def write_record(path: str | Path, run: Rollout) -> None:
     arrays["stance"] = np.array([number[stance] for stance in run.stances], dtype=int)
     text = json.dumps(header, default=_as_json)
     with (
-        file_errors("path", path, "run.npz", "cannot be written to", "Give another path."),
+        file_errors("path", path, "run.npz", "cannot be written to", "Pass another path."),
         whole_file(Path(os.path.expanduser(path)), keep_link=True) as part,
         part.open("wb") as file,
     ):
@@ -56,7 +56,7 @@ def write_record(path: str | Path, run: Rollout) -> None:
 def read_record(path: str | Path, robot: Robot | None) -> dict[str, Any]:
     """Return the fields of a run that was written to a file."""
     with (
-        file_errors("path", path, "run.npz", "cannot be read", "Give the path of a saved run."),
+        file_errors("path", path, "run.npz", "cannot be read", "Pass the path of a saved run."),
         open(os.path.expanduser(path), "rb", opener=open_file) as file,
     ):
         try:
@@ -74,7 +74,7 @@ def read_record(path: str | Path, robot: Robot | None) -> dict[str, Any]:
             raise
         except Exception as error:  # NumPy, zipfile, zlib and json raise many kinds
             raise InputError(
-                f"{path} is damaged, or it is not a record of a run. Give the path of a file that "
+                f"{path} is damaged, or it is not a record of a run. Pass the path of a file that "
                 f"Rollout.save has written."
             ) from error
     recorded = values["robot"]
@@ -84,7 +84,7 @@ def read_record(path: str | Path, robot: Robot | None) -> dict[str, Any]:
     if (recorded.nq, recorded.joint_names) != (robot.nq, robot.joint_names):
         raise InputError(
             f"{path} is a record of {recorded!r} with the joints {', '.join(recorded.joint_names)}."
-            f" {robot!r} has other joints. Give a robot with these joints, or leave robot out."
+            f" {robot!r} has other joints. Pass a robot with these joints, or omit robot."
         )
     return values | {"robot": robot}
 
@@ -143,7 +143,7 @@ def _as_json(value: Any) -> Any:
     if known is not LinearConstraint and (len(stored) < len(entries) or type(value) is not known):
         warn(
             f"A file cannot hold the functions of {getattr(value, 'name', 'the ground')}. A loaded "
-            f"run treats it as a {known.__name__} at rest; its recorded forces are exact.",
+            f"run has a {known.__name__} at rest instead, with the exact recorded forces.",
             SimulationWarning,
         )
     return {"class": known.__name__, **stored}
@@ -165,7 +165,7 @@ def _from_json(entries: dict[str, Any]) -> Any:
 
 
 def _make_robot(name: str, urdf: str, floating: bool, armature: Array, **others: Any) -> Robot:
-    """Load a robot again from what a file holds of it."""
+    """Make a robot from its entries in a file."""
     model = pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
     model.armature = np.array(armature)
     folders, feet = map(Path, others.pop("package_dirs")), others.pop("feet")

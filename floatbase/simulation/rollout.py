@@ -140,7 +140,7 @@ def rollout(
     -----
     SimulationWarning
         If pushes are given, but none acts during this rollout, or if the controller relies on a
-        contact or a constraint that the simulation does not have.
+        contact or a constraint that the simulation lacks.
 
     Examples
     --------
@@ -302,14 +302,14 @@ def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
 
 
 def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> set[str]:
-    """Warn of contacts that the simulation lacks; return them and the known ones."""
+    """Warn about contacts that the simulation lacks; return them and the known ones."""
     missing = {contact.name for contact in stance if not sim.has(contact)}
     if missing - known:
         warn(
             f"The controller relies on {', '.join(sorted(missing - known))}, but the simulation "
-            f"has nothing there. Use fb.Simulation(robot, contacts=controller.contacts), which has "
-            f"points, flat feet and wheels at any frame, fixed frames and rigid connections; "
-            f"moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
+            f"lacks them. Use fb.Simulation(robot, contacts=controller.contacts). It can have "
+            f"points, flat feet and wheels at any frame, fixed frames and rigid connections. "
+            f"Moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
             f"controller.",
             SimulationWarning,
         )

@@ -40,7 +40,7 @@ def read_sweep(path: str | Path) -> DataFrame:
     InputError
         If the file cannot be read or was not written by a sweep.
     """
-    advice = "Give the path of a sweep's file."
+    advice = "Pass the path of a sweep's file."
     with file_errors("path", path, "rows.jsonl", "cannot be read", advice):
         content = read_file(path, LARGEST_DATA)
     _, found = _read_rows(path, content)
@@ -68,7 +68,7 @@ class RowStore:
         self._path, self._file = path, -1
         if path is None:
             return
-        with file_errors("file", path, "rows.jsonl", "cannot be written to", "Give another file."):
+        with file_errors("file", path, "rows.jsonl", "cannot be written to", "Pass another file."):
             self._file = open_file(path, os.O_RDWR | os.O_CREAT | os.O_APPEND)
             try:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -115,9 +115,9 @@ class RowStore:
                 edited += is_older and self.rows[i]["error"] is None
         if edited:
             warn(
-                f"{found['sweep']}, its setup, or what they use was edited after {edited} of the "
-                f"rows in {path} were computed. These rows are kept. To compute them again, give "
-                f"another file, or remove this one.",
+                f"{found['sweep']}, its setup, or code that they use was edited after {edited} of "
+                f"the rows in {path} were computed. These rows are kept. To compute them again, "
+                f"pass another file, or remove this one.",
                 SimulationWarning,
             )
         os.ftruncate(self._file, len(complete_lines))
@@ -199,4 +199,4 @@ def _described(header: Row) -> str:
 
 def _wrong_file_error(path: str | os.PathLike[str], what: str) -> InputError:
     """Return the error for a file that does not belong to this sweep."""
-    return InputError(f"{path} {what}. It was not changed. Give another file, or remove this one.")
+    return InputError(f"{path} {what}. It was not changed. Pass another file, or remove this one.")

@@ -1,4 +1,4 @@
-"""The state in which a simulation starts: the robot stands on the ground with all feet."""
+"""The initial state of a simulation: the robot stands on the ground with all feet."""
 
 from __future__ import annotations
 

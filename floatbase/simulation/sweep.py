@@ -221,7 +221,7 @@ def _function_name(function: Any, file: Any) -> str:
 
 
 def _source_digest(*functions: Any) -> str:
-    """Return a digest of the source of functions and of what they use, "" if it is not known."""
+    """Return a digest of the source of functions and of what they use, "" if it is unknown."""
     parts: dict[Any, str] = {}
     for function in functions:
         _add_source(function, parts)

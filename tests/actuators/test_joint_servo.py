@@ -43,7 +43,7 @@ def test_go2_stands_and_trots_at_its_height_under_an_unknown_load():
         assert sinking(with_servo) < 0.005
 
 
-def test_without_load_the_springs_have_nothing_to_do():
+def test_the_springs_add_almost_no_torque_without_a_load():
     robot, controller = standing()
     servo = JointServo(robot, stiffness=80.0, damping=2.0, leak=0.0)
     record = run(controller, servo, 0.0, 0.5)
@@ -62,7 +62,7 @@ def test_targets_integrate_the_plan_and_are_never_far_from_the_measurement():
     acceleration = command.qdd[6:]
     assert np.allclose(targets.position, q + t * v + 0.5 * t**2 * acceleration)
     assert np.allclose(targets.velocity, v + t * acceleration)
-    for _ in range(1000):  # the robot is held fast
+    for _ in range(1000):  # the joints do not move
         targets = servo.targets(q, v, 0.01)
     assert np.all(20.0 * np.abs(targets.position - q) <= np.array(robot.torque_limits) + 1e-9)
     assert np.all(0.5 * np.abs(targets.velocity - v) <= np.array(robot.torque_limits) + 1e-9)
@@ -79,7 +79,7 @@ def test_torques_stay_within_the_limits_of_the_drivers():
     assert np.abs(servo.step(np.zeros(robot.d), q, np.zeros(robot.d), 0.001)).max() == 2.0
 
 
-def test_what_a_servo_cannot_use_is_refused():
+def test_a_servo_refuses_wrong_gains_and_commands():
     robot, _ = standing()
     with raises(InputError, "stiffness", -1):
         JointServo(robot, -1.0, 1.0)

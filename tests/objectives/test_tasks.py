@@ -168,7 +168,7 @@ def turning(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return about_z @ judges.rotation(3.0 * t * x), velocity, 6.0 * about_z @ [0.0, 1.0, 0.0]
 
 
-def test_a_target_that_a_function_returns_alone_is_differentiated():
+def test_a_target_function_that_returns_the_target_alone_is_differentiated():
     robot = judges.load("kinova")
     q, rates = robot.standing().q, np.linspace(-1.0, 1.0, robot.d)
     place, velocity = np.array([0.3, -0.2, 5.0]), np.array([1.0, 2.0, 3.0])
@@ -203,7 +203,7 @@ def test_a_target_that_a_function_returns_alone_is_differentiated():
     assert np.allclose(axis.residual(eom, 0.3).b, full.residual(eom, 0.3).b, atol=0.05)
 
 
-def test_jumps_kinks_and_ends_of_a_target_function_do_not_make_it_kick():
+def test_jumps_kinks_and_ends_of_a_target_function_cause_no_large_derivatives():
     robot, up = judges.load("go2"), np.array([0.0, 0.0, 1.0])
 
     def rates_of(path: Callable[[float], float], t: float) -> list[float]:

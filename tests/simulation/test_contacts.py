@@ -1,6 +1,4 @@
-"""Contacts that are not feet, in MuJoCo: a wall, a platform, a connection; plans against
-measurements.
-"""
+"""Planned and measured forces of contacts that are not feet: a wall, a platform, a connection."""
 
 from dataclasses import replace
 
@@ -154,7 +152,7 @@ def test_a_fixed_frame_is_fixed_in_the_simulation_with_the_planned_wrench(feet):
     assert np.abs(run.measured - run.planned)[-100:].max() < 2e-3 * GO2.weight
 
 
-def test_a_rollout_names_what_the_controller_relies_on_and_the_simulation_lacks():
+def test_a_rollout_warns_about_contacts_that_the_simulation_lacks():
     robot = GO2
     calf = fb.Contacts.points(robot, frames=["FL_calf"])
     drive = fb.Contacts([moving_frame("FR_foot", [0.0, 0.0, 0.1])])
@@ -168,7 +166,7 @@ def test_a_rollout_names_what_the_controller_relies_on_and_the_simulation_lacks(
             fb.rollout(sim, controller_of(contacts), PERIOD)
 
 
-def test_a_contact_that_begins_during_a_rollout_is_missed_when_it_begins():
+def test_a_rollout_warns_when_a_contact_that_the_simulation_lacks_begins():
     class Growing:
         def __init__(self) -> None:
             feet = fb.Contacts.feet(GO2)

@@ -1,4 +1,4 @@
-"""A robot in a MuJoCo scene from elsewhere, with other robots, another order and other names."""
+"""A robot in a foreign MuJoCo scene, with other robots, another order and other names."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def other_length(spec: mujoco.MjSpec) -> None:
 
 
 @pytest.mark.parametrize("change", [other_axis, other_zero, other_length])
-def test_a_joint_that_moves_its_link_otherwise_is_named(dog, change):
+def test_a_joint_that_moves_its_link_differently_is_named(dog, change):
     with raises(InputError, "FL_pitch"):
         MujocoAdapter(dog, scene("dog/", change=change))
 
@@ -158,7 +158,7 @@ def test_swapped_and_missing_and_ambiguous_names_are_refused(dog):
         MujocoAdapter(dog, small).q(mujoco.MjData(large))
 
 
-def test_a_base_that_floats_in_one_model_only_is_refused(dog, tmp_path):
+def test_a_base_that_floats_in_only_one_model_is_refused(dog, tmp_path):
     (tmp_path / "dog.xml").write_text(DOG.replace('<freejoint name="root"/>', ""))
     bolted = fb.load_mjcf(tmp_path / "dog.xml")
     with raises(InputError, "floating=True"):
@@ -193,7 +193,7 @@ def armed(spec: mujoco.MjSpec) -> None:
 @pytest.mark.parametrize(
     ("change", "sign"), [(heavier, "10.8 kg"), (weaker, "RR_pitch"), (armed, "dog/shoulder")]
 )
-def test_differences_that_a_controller_should_know_are_warned_about(dog, change, sign):
+def test_an_adapter_warns_about_differences_that_a_controller_should_know(dog, change, sign):
     with pytest.warns(SimulationWarning, match=sign):
         MujocoAdapter(dog, scene("dog/", change=change))
 

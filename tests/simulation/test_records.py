@@ -1,4 +1,4 @@
-"""A saved run is loaded as it was, and its table has everything under a name with a unit."""
+"""A loaded run equals the saved one, and its table has a name and a unit for each column."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ ROBOTS = {
 
 
 def without_control(robot: fb.Robot, seconds: float = 0.01) -> fb.Rollout:
-    """Return a run of a robot with little torques."""
+    """Return a run of a robot with small torques."""
     command = SimpleNamespace(tau=0.01 * np.arange(robot.d))
     return fb.rollout(fb.Simulation(robot), lambda q, v, t: command, seconds)
 
 
 def reloaded(run: fb.Rollout, folder: Path, **options: Any) -> fb.Rollout:
-    """Return a run after it was saved and loaded."""
+    """Save a run, and return the loaded one."""
     run.save(folder / "run.npz")
     return fb.Rollout.load(folder / "run.npz", **options)
 

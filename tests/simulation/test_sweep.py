@@ -232,7 +232,7 @@ def test_an_edit_of_a_function_or_of_what_it_uses_is_noticed(
     monkeypatch.chdir(tmp_path)
     first = run_edited(monkeypatch)
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # comments and formatting are no edits
+        warnings.simplefilter("error")  # comments and formatting are not edits
         assert run_edited(monkeypatch, "return 5 -> return (5)  # five") == first
     for _ in range(2):  # as long as the file has old rows
         with warns(SimulationWarning, "study", "rows.jsonl", 2):

@@ -65,7 +65,7 @@ def run_standing(
     sim = fb.Simulation(load_talos()) if sim is None else sim
     tasks = fb.standing_tasks(sim.state)
     controller = fb.WholeBodyController(sim.robot, contacts, tasks, **options)  # type: ignore[arg-type]
-    with warnings.catch_warnings():  # soles are bolted down for the controller alone
+    with warnings.catch_warnings():  # only the controller assumes that soles are bolted down
         warnings.simplefilter("ignore", SimulationWarning)
         return fb.rollout(sim, controller, duration, pushes, PERIOD)
 

@@ -68,7 +68,7 @@ def tilted(normal: Array, degrees: float, heading: float) -> Array:
 def twist_controller(
     state: fb.State, contacts: fb.Contacts, twist: Twist, mismatch: ModelMismatch
 ) -> fb.WholeBodyController:
-    """Return a controller that twists the robot and softens contacts it cannot hold."""
+    """Return a controller that twists the robot and softens contacts if it must."""
     path = elliptic_rotation(twist.pitch, twist.yaw, twist.rate, LOOPS, 90.0 * twist.direction)
     tasks: list[Task] = [
         fb.CoMTask(state.com, kp=KP_COM),

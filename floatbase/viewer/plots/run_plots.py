@@ -48,12 +48,12 @@ def plot_run(rollout: Runs, select: Sequence[str] = ()) -> Figure:
     Parameters
     ----------
     rollout : Rollout, or mapping of str to Rollout
-        Record to plot, or records to compare, by their names in the legends. Forces that were
-        planned are drawn for a single record only.
+        Record to plot, or records to compare, by their names in the legends. Planned forces are
+        drawn for a single record only.
     select : sequence of str, optional
         What to show: the plots "com", "forces", "friction" and "torques", contacts, and joints. An
-        asterisk stands for any characters, as in ``["torques", "FL_*"]``. Without plots, those of
-        the contacts and joints are shown; by default, everything is.
+        asterisk stands for any characters, as in ``["torques", "FL_*"]``. If no plot is named, the
+        plots of the named contacts and joints are shown. By default, everything is shown.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def plot_com(rollout: Runs, axis: Axes | None = None) -> Axes:
 
 
 def plot_forces(rollout: Runs, axis: Axes | None = None, select: Sequence[str] = ()) -> Axes:
-    """Plot the measured normal force at each contact [N]; for a flat foot, that of its corners.
+    """Plot the measured normal force at each contact [N]; for a flat foot, the sum of its corners.
 
     A wider line behind it shows the planned force.
 
@@ -138,7 +138,7 @@ def plot_forces(rollout: Runs, axis: Axes | None = None, select: Sequence[str] =
 
 
 def plot_friction(rollout: Runs, axis: Axes | None = None, select: Sequence[str] = ()) -> Axes:
-    """Plot the used fraction of friction at each contact; for a flat foot, the largest of a corner.
+    """Plot the used fraction of friction at each contact; for a flat foot, its worst corner.
 
     The fraction is ‖f_tangent‖ / (μ f_normal). Above 1, a force is outside its cone. The curve of a
     contact has gaps where it carries little load; see `friction_used`. A wider line shows the

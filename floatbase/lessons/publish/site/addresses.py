@@ -29,7 +29,7 @@ PACKAGES = {
     "floatbase.linear_algebra": "ranks and null spaces",
     "floatbase.errors": "exceptions",
 }
-# what the course derives, and a controller does not need: at the end of the page of its package
+# derived in the course, and not needed by a controller: at the end of the page of its package
 ALGEBRA = {
     "accelerations_from_torques", "argmin_coordinates", "bias_forces", "com_wrench_map",
     "contact_space", "coriolis_matrix", "cost_on_space", "delassus_matrix", "desired_wrench",
