@@ -80,7 +80,9 @@ class MPC(Walk):
     Raises
     ------
     InputError
-        If an argument is out of range, if an option is unknown, or if a contact is a flat foot.
+        If an argument is out of range or if a contact is a flat foot.
+    UnknownArgumentError
+        If an option is unknown.
 
     Notes
     -----

@@ -47,7 +47,9 @@ class Stand(Walk):
     Raises
     ------
     InputError
-        If an argument is out of range, or if an option is unknown.
+        If an argument is out of range.
+    UnknownArgumentError
+        If an option is unknown.
 
     Notes
     -----

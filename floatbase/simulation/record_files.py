@@ -108,7 +108,8 @@ def _rollout_fields(header: dict[str, Any], arrays: dict[str, Any]) -> dict[str,
 def _check_shapes(path: str | Path, values: dict[str, Any]) -> None:
     """Raise `InputError` for an array that does not fit the robot, the contacts and the times."""
     robot, contacts, n = values["robot"], values["contacts"], len(values["time"])
-    widths = dict(time=(), q=(robot.nq,), v=(robot.nv,), tau=(robot.d,), tau_desired=(robot.d,))
+    widths: dict[str, tuple[int, ...]] = {"time": (), "q": (robot.nq,), "v": (robot.nv,)}
+    widths |= dict.fromkeys(("tau", "tau_desired"), (robot.d,))
     widths |= dict.fromkeys(("planned", "measured"), (contacts.k,))
     widths["foot_positions"] = (contacts.n_points, 3)
     for name, width in widths.items():

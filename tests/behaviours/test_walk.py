@@ -23,7 +23,8 @@ from numpy.testing import assert_allclose
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Stand, Walk, raibert_foothold
-from floatbase.errors import InputError, SimulationWarning
+from floatbase.dynamics import fixed_frame
+from floatbase.errors import InputError, SimulationWarning, UnknownArgumentError
 from floatbase.robots import Foot, Robot
 from floatbase.simulation import Rollout
 
@@ -523,7 +524,7 @@ def test_invalid_arguments_are_refused_when_a_walk_is_made():
     for call, *named in (
         (lambda: Walk(robot, contacts.without("FL_foot"), trot), "FL_foot"),
         (lambda: Walk(robot, fb.Contacts.none(), trot), "FL_foot"),
-        (lambda: Walk(robot, contacts, trot, speed=0.3), "speed", "facets"),
+        (lambda: Walk(robot, contacts + fb.Contacts([fixed_frame("base")]), trot), "bolts of base"),
         (lambda: Walk(robot, contacts, trot, tasks=[3]), "tasks"),
         (lambda: Walk(robot, contacts, trot, ground=3), "ground", "height"),
         (lambda: Walk(robot, contacts, trot, acceleration=(-1.0, 1.0)), "acceleration", -1),
@@ -547,6 +548,13 @@ def test_invalid_arguments_are_refused_when_a_walk_is_made():
         (lambda: setattr(walk, "yaw_rate", np.nan), "yaw_rate", np.nan),
     ):
         refused(call, InputError, *named)
+    for wrong, call in (
+        ("velocty", lambda: Walk(robot, contacts, trot, velocty=(0.3, 0.0))),
+        ("joint_limit", lambda: Walk(robot, contacts, trot, joint_limit=None)),
+    ):
+        refused(
+            call, UnknownArgumentError, wrong, {"velocty": "velocity"}.get(wrong, "joint_limits")
+        )
     refused(lambda: setattr(walk, "velocity", (100.0, 0.0)), InputError, "speed", 100)
     assert np.array_equal(walk.velocity, (0.0, 0.0))  # a value that was refused is not kept
     for name in ("clearance", "history", "time", "velocty"):

@@ -130,8 +130,8 @@ def test_other_files_and_robots_are_refused(tmp_path: Path) -> None:
     changes = [
         ("2", {"header": np.array(newer)}),
         ("damaged", {"header": np.zeros(3)}),
-        ("q ", {"q": arrays["q"][:-1]}),
-        ("tau ", {"tau": arrays["tau"][:, :-1]}),
+        ("(4, 19)", {"q": arrays["q"][:-1]}),
+        ("(5, 11)", {"tau": arrays["tau"][:, :-1]}),
     ]
     for named, change in changes:
         np.savez(path, **arrays | change)
@@ -202,7 +202,7 @@ def test_tables_have_soles_sliding_joints_wheels_and_empty_runs() -> None:
     assert_allclose(np.cos(angle), tiago.q[:, index], atol=1e-12)
 
     def fails(q: Any, v: Any, t: float) -> Any:
-        raise InputError("no")
+        raise InfeasibleError("no")
 
     empty = fb.rollout(fb.Simulation(judges.load("go2")), fails, 0.01).table()
     assert len(empty) == 0 and set(empty.columns) == set(record().table().columns)

@@ -26,7 +26,7 @@ from floatbase.behaviours.terrain import Terrain, as_terrain
 from floatbase.behaviours.walk.gait import Gait, check_always_supported
 from floatbase.behaviours.walk.swing import Swing, SwingPath
 from floatbase.control import WholeBodyController
-from floatbase.dynamics import Contacts, FlatFootContact
+from floatbase.dynamics import Contacts, FlatFootContact, FrictionContact
 from floatbase.errors import InputError, check_arguments
 from floatbase.objectives import Task
 from floatbase.robots import State
@@ -158,6 +158,11 @@ def as_gait(gait: Gait, contacts: Contacts, may_fly: bool) -> Gait:
 
     may_fly: whether all feet may be in the air.
     """
+    if others := [contact.name for contact in contacts if not isinstance(contact, FrictionContact)]:
+        raise InputError(
+            f"A walk supports the robot at points, soles and wheels, but {', '.join(others)} is "
+            f"another constraint. Leave it out, and pass tasks for the arms instead."
+        )
     for foot in as_instance("gait", gait, Gait, "Gait.trot(robot)").feet:
         if foot not in contacts.names:
             names = ", ".join(contacts.names) or "none"
