@@ -253,9 +253,11 @@ class WholeBodyController:
             )
         self._compiled = None if reason else compiled
         if self._compiled is not None:
-            names = ", ".join(self._compiled.user_terms.names)
+            terms = list(self._compiled.user_terms.names)
+            moving = [task.name for task in self._compiled.unchecked_tasks]
+            terms += [f"the target of {name}" for name in moving if name not in terms]
             reason = "it supports this problem" + cache_warning()
-            reason += f"; these terms run as Python beside it: {names}" if names else ""
+            reason += f"; these run as Python beside it: {', '.join(terms)}" if terms else ""
         self._backend_reason = reason
 
     def _with_problem(

@@ -538,6 +538,10 @@ def test_the_reason_of_the_backend_names_what_runs_as_python():
     others = [LinearInequality("constant", "tau", rows), capture_point_inequality()]
     compiled = judges.pair(robot, judges.stance(robot), inequalities=[*others, mine])[0]
     assert compiled.backend_reason.endswith("Python beside it: mine")
+    com, *rest = fb.standing_tasks(robot.standing())
+    circling = fb.CoMTask(lambda t: com.target)
+    tasks = compiled.replace(inequalities=others, tasks=[circling, *rest])
+    assert tasks.backend_reason.endswith(f"beside it: the target of {com.name}")
 
 
 def test_another_solver_uses_the_reference_backend_and_the_reason_names_the_solver():
