@@ -68,9 +68,11 @@ class Connections:
     def forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         """Return force [N] and moment [N·m] on each first frame in world axes, shape (6 n,)."""
         welds, forces = data.efc_id[: data.ne], data.efc_force[: data.ne]
-        wrenches = np.array([forces[welds == weld] for weld in self._welds]).reshape(-1, 6)
+        wrenches = np.zeros((len(self._welds), 6))
         for weld, wrench in zip(self._welds, wrenches, strict=True):
-            # MuJoCo measures turns by the vector of a quaternion, half of the angle
-            axes = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
-            wrench[3:] = 0.5 * axes @ wrench[3:]
+            rows = forces[welds == weld]
+            if rows.size:  # a weld of two bodies that cannot move has none
+                # MuJoCo measures turns by the vector of a quaternion, half of the angle
+                axes = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
+                wrench[:3], wrench[3:] = rows[:3], 0.5 * axes @ rows[3:]
         return wrenches.ravel()

@@ -21,6 +21,7 @@ from floatbase._validation import (
     cached_property,
     checked,
     numeric_copy,
+    one_or_each,
     read_only,
 )
 from floatbase.dynamics import UP
@@ -90,7 +91,7 @@ class Ground(Value):
     ----------
     mu : float or array_like, shape (n,), optional
         Coefficient of friction between the ground and the feet, positive: one number for all, or
-        one for each of n planes [-]. Boxes and the links of a fallen robot have the first one.
+        one for each of n planes [-]. Boxes have the first one.
     normal : array_like, shape (3,) or (n, 3), optional
         Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
         it is normalized.
@@ -143,11 +144,8 @@ class Ground(Value):
         acceleration: Acceleration = None,
     ):
         normals, offsets = as_half_spaces("the ground", normal, offset)
-        given = numeric_copy(mu)
-        shape = () if given is None or given.ndim == 0 else (len(normals),)
-        mus = np.broadcast_to(as_array("mu of Ground", mu, shape), len(normals))
-        for i, each in enumerate(mus):
-            as_positive(f"mu of Ground for plane {i}" if shape else "mu of Ground", each)
+        mus = one_or_each("mu of Ground", mu, len(normals), ())
+        as_positive("mu of Ground", float(mus.min()))
         vars(self).update(
             mus=read_only(mus),
             normals=normals,
