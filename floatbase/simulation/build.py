@@ -134,8 +134,7 @@ def _build_spec(
     contact = spec.default.geom
     # no torsional or rolling friction
     contact.condim = 3
-    # of two coefficients, MuJoCo takes the larger one: that of the plane or the box
-    contact.friction = [min(ground.mus), 0.0, 0.0]
+    contact.friction = [ground.mus[0], 0.0, 0.0]
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
@@ -161,8 +160,7 @@ def _build_spec(
     for x0, x1, y0, y1, top in ground.boxes:
         box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
         centre = [x0 + half[0], y0 + half[1], top - half[2]]
-        geom = spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
-        geom.friction[0] = ground.mus[0]
+        spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
     for part in (*feet, *extra):
         if frames := connected_frames(part):
@@ -171,7 +169,8 @@ def _build_spec(
             weld.solref[:], weld.solimp[:2] = contact.solref, _CONNECTION_IMPEDANCE
             weld.name1, weld.name2 = (_carrier(spec, robot, frame)[0].name for frame in frames)
         else:
-            _add_foot_balls(spec, robot, part)
+            # of two coefficients of friction, MuJoCo takes the larger one, which is the plane's
+            _add_foot_balls(spec, robot, part, min(ground.mus))
     _add_link_hulls(spec, robot)
     return spec
 
@@ -292,7 +291,7 @@ def _inertia_error(robot: Robot, bodies: Sequence[mujoco.MjsBody], inertia: pin.
     )
 
 
-def _add_foot_balls(spec: mujoco.MjSpec, robot: Robot, contact: Any) -> None:
+def _add_foot_balls(spec: mujoco.MjSpec, robot: Robot, contact: Any, mu: float) -> None:
     """Add a ball or a disc for each contact point of a foot; the point is its lowest one."""
     body, pose = _carrier(spec, robot, contact.frame)
     if isinstance(contact, FlatFootContact):
@@ -304,7 +303,7 @@ def _add_foot_balls(spec: mujoco.MjSpec, robot: Robot, contact: Any) -> None:
         geom = body.add_geom(  # a geom without a type is a sphere
             name=name, size=[radius, 0.0, 0.0], mass=0.0, contype=0, conaffinity=1
         )
-        geom.pos = pose.act(centre)
+        geom.pos, geom.friction[0] = pose.act(centre), mu
         if isinstance(contact, RollingWheel):
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_ELLIPSOID, [radius, radius, _RIM_WIDTH]
             mujoco.mju_quatZ2Vec(geom.quat, pose.rotation @ contact.axis)

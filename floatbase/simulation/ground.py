@@ -91,7 +91,7 @@ class Ground(Value):
     ----------
     mu : float or array_like, shape (n,), optional
         Coefficient of friction between the ground and the feet, positive: one number for all, or
-        one for each of n planes [-]. Boxes have the first one.
+        one for each of n planes [-]. Boxes and the links of a fallen robot have the first one.
     normal : array_like, shape (3,) or (n, 3), optional
         Normal of the plane, or of each of n planes, in the world frame, pointing out of the ground;
         it is normalized.

@@ -5,7 +5,6 @@ measurements.
 from dataclasses import replace
 
 import judges
-import mujoco
 import numpy as np
 import pytest
 from judges import Array
@@ -162,14 +161,6 @@ def test_a_fixed_frame_of_a_fixed_base_takes_no_force():
     sim.step(np.zeros(robot.d))
     base, tool = sim.connection_forces().reshape(2, 6)
     assert not base.any() and np.linalg.norm(tool[:3]) > 1.0
-
-
-def test_all_parts_of_a_robot_have_the_friction_of_the_plane_that_they_touch():
-    walls = fb.Ground([0.9, 0.3], normal=[UP, [-1.0, 0.0, 0.0]], offset=[0.0, -2.0])
-    model = fb.Simulation(GO2, walls).model
-    mus, is_plane = model.geom_friction[:, 0], model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    pairs = np.maximum.outer(mus[~is_plane], mus[is_plane])  # as MuJoCo combines them
-    assert np.all(pairs == [0.9, 0.3])
 
 
 def test_a_rollout_names_what_the_controller_relies_on_and_the_simulation_lacks():
