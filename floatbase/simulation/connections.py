@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.dynamics import (
@@ -58,12 +59,9 @@ class Connections:
             point = state.point(connected_frames(contact)[0])
             # the point in the second body and in the first one, then the second's orientation in
             # the first
-            for body, entries in zip(pair, (slice(3, 6), slice(0, 3)), strict=True):
-                axes = data.xmat[body].reshape(3, 3)
-                pose[entries] = axes.T @ (point - data.xpos[body])
-            inverse = np.empty(4)
-            mujoco.mju_negQuat(inverse, data.xquat[pair[0]])
-            mujoco.mju_mulQuat(pose[6:10], inverse, data.xquat[pair[1]])
+            first, second = (pin.SE3(data.xmat[i].reshape(3, 3), data.xpos[i]) for i in pair)
+            pose[3:6], pose[:3] = first.actInv(point), second.actInv(point)
+            mujoco.mju_mat2Quat(pose[6:10], (first.rotation.T @ second.rotation).ravel())
 
     def forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         """Return force [N] and moment [N·m] on each first frame in world axes, shape (6 n,)."""

@@ -447,15 +447,14 @@ class Recorder:
                     f"remain a flat foot."
                 )
         measured, positions = self._measured_at(contacts)
+        actuator_forces = self._step_actuator_forces[: self._n * self._substeps]
         return Rollout(
             self._sim.robot,
             contacts,
             time=self._complete_rows(self._time),
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
-            tau=self._mean_over_substeps(
-                self._sim._torques_of(self._step_actuator_forces[: self._n * self._substeps])
-            ),
+            tau=self._mean_over_substeps(actuator_forces[:, self._sim._actuator_ids]),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
             measured=measured,

@@ -165,7 +165,8 @@ def rollout(
         warn(warning, SimulationWarning)
     stance = _current_stance(sim, controller)
     record = Recorder(sim, stance, ticks + settling_ticks, substeps)
-    missing = _warn_of_missing(sim, stance, set())
+    missing: set[str] = set()
+    _warn_of_missing(sim, stance, missing)
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
         controller_off_time = sim.time
@@ -193,7 +194,7 @@ def rollout(
                 return end("controller failed", error)
             previous, stance = stance, _current_stance(sim, controller)
             if stance is not previous:
-                missing = _warn_of_missing(sim, stance, missing)
+                _warn_of_missing(sim, stance, missing)
             try:
                 desired = _desired_torques(sim, command)
                 planned = _planned_forces(command, stance)
@@ -293,19 +294,19 @@ def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
     return contacts if isinstance(contacts, Contacts) else sim.feet
 
 
-def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> set[str]:
-    """Warn of contacts that the simulation lacks; return them and the known ones."""
-    missing = {contact.name for contact in stance if not sim.has(contact)}
-    if missing - known:
+def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> None:
+    """Warn of contacts that the simulation lacks, and add them to the known ones."""
+    missing = {contact.name for contact in stance if not sim.has(contact)} - known
+    known |= missing
+    if missing:
         warn(
-            f"The controller relies on {', '.join(sorted(missing - known))}, but the simulation "
-            f"has nothing there. Use fb.Simulation(robot, contacts=controller.contacts), which has "
+            f"The controller relies on {', '.join(sorted(missing))}, but the simulation has "
+            f"nothing there. Use fb.Simulation(robot, contacts=controller.contacts), which has "
             f"points, flat feet and wheels at any frame, fixed frames and rigid connections; "
             f"moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
             f"controller.",
             SimulationWarning,
         )
-    return known | missing
 
 
 def _run_substeps(
