@@ -35,13 +35,8 @@ def connected_frames(contact: MotionConstraint) -> tuple[str, ...]:
 def parts_of(feet: Contacts, contacts: Contacts) -> Contacts:
     """Return what a simulation can have of the contacts, besides the feet."""
     touching = PointContact, FlatFootContact, RollingWheel
-    return Contacts(
-        [
-            each
-            for each in contacts
-            if each.name not in feet.names and (type(each) in touching or connected_frames(each))
-        ]
-    )
+    others = [each for each in contacts if each.name not in feet.names]
+    return Contacts([each for each in others if type(each) in touching or connected_frames(each)])
 
 
 class Connections:

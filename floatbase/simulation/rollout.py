@@ -160,9 +160,7 @@ def rollout(
             f"A duration of {duration:g} s has {steps} timesteps, but a record holds at most "
             f"{_MAX_STEPS}. Use several rollouts; each continues where the last one ended."
         )
-    warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
-    if warning:
-        warn(warning, SimulationWarning)
+    _warn_of_inactive(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     stance = _current_stance(sim, controller)
     record = Recorder(sim, stance, ticks + settling_ticks, substeps)
     missing: set[str] = set()
@@ -228,10 +226,10 @@ def _period_count(name: str, time: float, unit: str, period: float, minimum: int
     return count
 
 
-def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -> str:
-    """Return a warning if there are pushes and none acts from `begin` to `end` [s], else ""."""
+def _warn_of_inactive(pushes: tuple[Push, ...], begin: float, end: float) -> None:
+    """Warn if there are pushes and none acts from `begin` to `end` [s]."""
     if not pushes or active_pushes(pushes, begin, end):
-        return ""
+        return
     first, what = pushes[0], "The push does not act during this rollout. It"
     if len(pushes) > 1:
         what = f"None of the {len(pushes)} pushes acts during this rollout. The first one"
@@ -239,9 +237,10 @@ def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -
         advice = f"Call sim.reset() to restart the clock, or use start=sim.time + {first.start:g}"
     else:
         advice = f"Use a duration of more than {first.start - begin:g} s"
-    return (
+    warn(
         f"{what} acts from {first.start:g} to {first.start + first.duration:g} s, but the rollout "
-        f"goes from {begin:g} to {end:g} s. {advice}."
+        f"goes from {begin:g} to {end:g} s. {advice}.",
+        SimulationWarning,
     )
 
 

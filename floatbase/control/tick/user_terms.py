@@ -147,12 +147,12 @@ class UserTerms:
             return equations_of_motion(state, contacts, t)
         given, rows = iter(inputs.contacts), list[tuple[Array, ...]]()
         for contact in contacts:
+            inputs_of_contact = next(given) if _has_inputs(contact) else ()
             if contact_kind(contact) == USER_DEFINED:
-                rows.append(next(given))
-                continue
-            if _has_inputs(contact):
-                contact = _with_acceleration(contact, *next(given))
-            rows.append(constraint_and_jacobian(contact, state, t))
+                rows.append(inputs_of_contact)
+            else:
+                constant = _with_acceleration(contact, *inputs_of_contact)
+                rows.append(constraint_and_jacobian(constant, state, t))
         A, b, J = (read_only(np.concatenate(parts)) for parts in zip(*rows, strict=True))
         return EquationsOfMotion(state, contacts, t, A=A, b=b, J=J)
 
@@ -162,12 +162,13 @@ def _has_inputs(contact: MotionConstraint) -> bool:
     return contact_kind(contact) == USER_DEFINED or acceleration_of(contact) is not None
 
 
-def _with_acceleration(contact: Any, acceleration: Array) -> MotionConstraint:
-    """Return a contact with a constant acceleration."""
-    if isinstance(contact, LinearConstraint):
-        function: Any = contact.function
-        return replace(contact, function=replace(function, acceleration=acceleration))
-    return cast(MotionConstraint, replace(contact, acceleration=acceleration))
+def _with_acceleration(contact: Any, *acceleration: Array) -> MotionConstraint:
+    """Return a contact with a constant acceleration, or the contact itself if none is given."""
+    for value in acceleration:
+        is_linear = isinstance(contact, LinearConstraint)
+        part = replace(contact.function if is_linear else contact, acceleration=value)
+        contact = replace(contact, function=part) if is_linear else part
+    return cast(MotionConstraint, contact)
 
 
 def _group(each: LinearInequality, eom: EquationsOfMotion, t: float = 0.0) -> Group:
