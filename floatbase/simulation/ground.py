@@ -145,7 +145,8 @@ class Ground(Value):
     ):
         normals, offsets = as_half_spaces("the ground", normal, offset)
         mus = one_or_each("mu of Ground", mu, len(normals), ())
-        as_positive("mu of Ground", float(mus.min()))
+        for i, each in enumerate(mus):
+            as_positive(f"mu of Ground for plane {i}", float(each))
         vars(self).update(
             mus=read_only(mus),
             normals=normals,
