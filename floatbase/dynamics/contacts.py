@@ -391,10 +391,8 @@ class Contacts(Value):
             raise InputError(
                 f"forces {got}, but {self!r} needs shape ({self.k},) or (n, {self.k}) [N]."
             )
-        at_points = stacked[..., part].reshape(
-            *stacked.shape[:-1], (part.stop - part.start) // 3, 3
-        )
-        return read_only(at_points.sum(axis=-2))
+        components = [stacked[..., part][..., i::3].sum(axis=-1) for i in range(3)]
+        return read_only(np.stack(components, axis=-1))
 
     def friction_contact(self, name: str) -> FrictionContact:
         """Return a contact whose forces act at points.

@@ -6,8 +6,7 @@ import numpy as np
 
 from floatbase.robots.state import State
 
-# cosines of a base's tilt: at 30°, a robot may stand, and beyond 60° no controller keeps it up
-_UPRIGHT, _TILTED = 0.87, 0.5
+_MIN_COSINE = 0.5  # of a base's tilt: beyond 60°, no controller keeps a robot up
 
 
 def is_upright(state: State) -> bool:
@@ -22,17 +21,13 @@ def is_upright(state: State) -> bool:
 
 def pose_question(state: State) -> str:
     """Return a question for the message of a controller that fails upside down, else ""."""
-    robot = state.robot
-    if not robot.is_floating:
+    if not state.robot.is_floating:
         return ""
-    upright = robot.standing().frame_pose("base").rotation[2]  # the vertical in the base's axes
-    rearranged = np.concatenate([state.q[:3], state.q[[4, 5, 6, 3]], state.q[7:]])
-    cosines = [
-        float(upright @ each.frame_pose("base").rotation[2])
-        for each in (state, state.replace(q=rearranged))
-    ]
-    is_rearranged = cosines[0] < _TILTED < _UPRIGHT < cosines[1]
-    if is_upright(state) and not is_rearranged:
+    # the vertical in the axes of the base
+    upright, vertical = (
+        each.frame_pose("base").rotation[2] for each in (state.robot.standing(), state)
+    )
+    if upright @ vertical > _MIN_COSINE and is_upright(state):
         return ""
     return (
         "The robot is upside down or on its side. Is its quaternion in the order w x y z, as in "

@@ -11,7 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -52,63 +52,50 @@ _MIN_INERTIA = 1e-15  # kg m²: MuJoCo treats smaller principal inertias as zero
 # rounding
 _RELATIVE_ROUNDING = 1e-9
 
-# contacts that are not feet, and connections, as from `connections.parts_of`
-Extra: TypeAlias = tuple[MotionConstraint, ...]
 _JOINT_ATTRIBUTES = ("name", "type", "range", "limited", "actfrcrange", "actfrclimited")
 
 
-def build_model(
-    robot: Robot, ground: Ground, timestep: float, losses: bool, extra: Extra
-) -> mujoco.MjModel:
-    """Build the MuJoCo model of a robot on the ground.
-
-    The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
-    and motors the names of the joints.
-    """
-    folders = robot.package_dirs
-    return copy.copy(_compiled_model(robot, folders, _ground_data(ground), timestep, losses, extra))
-
-
-def build_spec(
-    robot: Robot, ground: Ground, timestep: float, losses: bool, extra: Extra
-) -> mujoco.MjSpec:
-    """Write the description from which `build_model` builds the model, from the same arguments."""
-    return _build_spec(robot, _ground_data(ground), timestep, losses, extra)
-
-
-class _GroundData(NamedTuple):
-    """The numbers of a ground that the model needs. Grounds with equal numbers are equal."""
+class World(NamedTuple):
+    """What a model has besides the robot. Worlds with equal numbers are equal."""
 
     mus: tuple[float, ...]  # one for each plane
     planes: tuple[tuple[float, ...], ...]  # normal, offset
     boxes: tuple[tuple[float, ...], ...]  # both ends along x, both ends along y, top
+    timestep: float
+    losses: bool
+    extra: tuple[MotionConstraint, ...]  # contacts that are not feet, and connections
 
 
-def _ground_data(ground: Ground) -> _GroundData:
-    """Return the numbers of a ground that the model needs."""
+def world_of(ground: Ground, timestep: float, losses: bool, extra: Contacts) -> World:
+    """Return the world of a simulation; extra: as from `connections.parts_of`."""
     planes = np.column_stack([ground.normals, ground.offsets])
-    return _GroundData(
+    return World(
         tuple(ground.mus.tolist()),
         tuple(map(tuple, planes.tolist())),
         tuple(map(tuple, ground.box_bounds.tolist())),
+        timestep,
+        losses,
+        tuple(extra),
     )
 
 
+def build_model(robot: Robot, world: World) -> mujoco.MjModel:
+    """Build the MuJoCo model of a robot in a world.
+
+    The ground can touch the feet and the links' hulls. Geoms have the names of the contact points,
+    and motors the names of the joints.
+    """
+    return copy.copy(_compiled_model(robot, robot.package_dirs, world))
+
+
 @lru_cache(maxsize=8)  # the hulls of its links make a robot's model 2 MB large
-def _compiled_model(
-    robot: Robot,
-    folders: tuple[Path, ...],
-    ground: _GroundData,
-    timestep: float,
-    losses: bool,
-    extra: Extra,
-) -> mujoco.MjModel:
+def _compiled_model(robot: Robot, folders: tuple[Path, ...], world: World) -> mujoco.MjModel:
     """Compile a model, which takes MuJoCo ten times as long as a copy. Do not change it.
 
     Equal robots with meshes in other folders can have other hulls.
     """
     try:
-        model = _build_spec(robot, ground, timestep, losses, extra).compile()
+        model = build_spec(robot, world).compile()
     except ValueError as error:
         raise SimulationError(
             f"MuJoCo cannot build {robot.name}. Correct the URDF: {error}"
@@ -122,19 +109,17 @@ def _compiled_model(
     return model
 
 
-def _build_spec(
-    robot: Robot, ground: _GroundData, timestep: float, losses: bool, extra: Extra
-) -> mujoco.MjSpec:
-    """Write the description of a model."""
+def build_spec(robot: Robot, world: World) -> mujoco.MjSpec:
+    """Write the description from which `build_model` builds the model."""
     spec = _spec_from_urdf(robot)
-    spec.option.timestep = timestep
+    spec.option.timestep = world.timestep
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = _IMPEDANCE_RATIO
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     contact = spec.default.geom
     # no torsional or rolling friction
     contact.condim = 3
-    contact.friction = [ground.mus[0], 0.0, 0.0]
+    contact.friction = [world.mus[0], 0.0, 0.0]
     contact.solref, contact.solimp = [_CONTACT_TIME_CONSTANT, 1.0], _CONTACT_IMPEDANCE
     if robot.is_floating:
         spec.body(body_name(robot.base)).add_freejoint()
@@ -142,14 +127,14 @@ def _build_spec(
         joint, i = spec.joint(name), robot.model.idx_vs[robot.model.getJointId(name)]
         joint.armature = float(robot.model.armature[i])
         # the force of damping is linear in the velocity; MuJoCo has terms of higher order, too
-        joint.damping[:] = [losses * robot.model.damping[i], 0.0, 0.0]
-        joint.frictionloss = losses * float(robot.model.friction[i])
+        joint.damping[:] = [world.losses * robot.model.damping[i], 0.0, 0.0]
+        joint.frictionloss = world.losses * float(robot.model.friction[i])
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the motor has the limit
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_motor()
         if np.isfinite(limit):
             motor.ctrlrange = [-limit, limit]
-    for mu, (*direction, offset) in zip(ground.mus, ground.planes, strict=True):
+    for mu, (*direction, offset) in zip(world.mus, world.planes, strict=True):
         normal = np.array(direction)
         plane = spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE, contype=1, conaffinity=0, pos=offset * normal
@@ -157,12 +142,12 @@ def _build_spec(
         plane.size[2] = 0.05  # MuJoCo requires a size, but does not use it
         plane.friction[0] = mu
         mujoco.mju_quatZ2Vec(plane.quat, normal)
-    for x0, x1, y0, y1, top in ground.boxes:
+    for x0, x1, y0, y1, top in world.boxes:
         box, half = mujoco.mjtGeom.mjGEOM_BOX, 0.5 * np.array([x1 - x0, y1 - y0, _BOX_DEPTH])
         centre = [x0 + half[0], y0 + half[1], top - half[2]]
         spec.worldbody.add_geom(type=box, contype=1, conaffinity=0, pos=centre, size=half)
     feet = Contacts.feet(robot) if robot.feet else Contacts.none()
-    for part in (*feet, *extra):
+    for part in (*feet, *world.extra):
         if frames := connected_frames(part):
             weld = spec.add_equality(name=part.name, type=mujoco.mjtEq.mjEQ_WELD)
             weld.objtype, weld.data[10] = mujoco.mjtObj.mjOBJ_BODY, 1.0  # no scale of moments
@@ -170,7 +155,7 @@ def _build_spec(
             weld.name1, weld.name2 = (_carrier(spec, robot, frame)[0].name for frame in frames)
         else:
             # of two coefficients of friction, MuJoCo takes the larger one, which is the plane's
-            _add_foot_balls(spec, robot, part, min(ground.mus))
+            _add_foot_balls(spec, robot, part, min(world.mus))
     _add_link_hulls(spec, robot)
     return spec
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 
 from floatbase._validation import Array
 from floatbase.dynamics import (
@@ -34,13 +35,8 @@ def connected_frames(contact: MotionConstraint) -> tuple[str, ...]:
 def parts_of(feet: Contacts, contacts: Contacts) -> Contacts:
     """Return what a simulation can have of the contacts, besides the feet."""
     touching = PointContact, FlatFootContact, RollingWheel
-    return Contacts(
-        [
-            each
-            for each in contacts
-            if each.name not in feet.names and (type(each) in touching or connected_frames(each))
-        ]
-    )
+    others = [each for each in contacts if each.name not in feet.names]
+    return Contacts([each for each in others if type(each) in touching or connected_frames(each)])
 
 
 class Connections:
@@ -58,19 +54,18 @@ class Connections:
             point = state.point(connected_frames(contact)[0])
             # the point in the second body and in the first one, then the second's orientation in
             # the first
-            for body, entries in zip(pair, (slice(3, 6), slice(0, 3)), strict=True):
-                axes = data.xmat[body].reshape(3, 3)
-                pose[entries] = axes.T @ (point - data.xpos[body])
-            inverse = np.empty(4)
-            mujoco.mju_negQuat(inverse, data.xquat[pair[0]])
-            mujoco.mju_mulQuat(pose[6:10], inverse, data.xquat[pair[1]])
+            first, second = (pin.SE3(data.xmat[i].reshape(3, 3), data.xpos[i]) for i in pair)
+            pose[3:6], pose[:3] = first.actInv(point), second.actInv(point)
+            mujoco.mju_mat2Quat(pose[6:10], (first.rotation.T @ second.rotation).ravel())
 
     def forces(self, model: mujoco.MjModel, data: mujoco.MjData) -> Array:
         """Return force [N] and moment [N·m] on each first frame in world axes, shape (6 n,)."""
         welds, forces = data.efc_id[: data.ne], data.efc_force[: data.ne]
-        wrenches = np.array([forces[welds == weld] for weld in self._welds]).reshape(-1, 6)
+        wrenches = np.zeros((len(self._welds), 6))
         for weld, wrench in zip(self._welds, wrenches, strict=True):
-            # MuJoCo measures rotations by the vector part of a quaternion, half of the angle
-            axes = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
-            wrench[3:] = 0.5 * axes @ wrench[3:]
+            rows = forces[welds == weld]
+            if rows.size:  # a weld of two bodies that cannot move has none
+                # MuJoCo measures rotations by the vector part of a quaternion, half of the angle
+                axes = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
+                wrench[:3], wrench[3:] = rows[:3], 0.5 * axes @ rows[3:]
         return wrenches.ravel()

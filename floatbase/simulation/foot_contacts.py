@@ -34,8 +34,8 @@ class FootContacts:
         """Return the n contacts of the feet at this instant."""
         contact = data.contact
         forces = data.efc_force
-        n_others = data.ne + data.nl
-        if n_others:  # the contacts follow connections and joints that are at their limits
+        n_others = data.ne + data.nf + data.nl
+        if n_others:  # the contacts follow connections, dry friction and joints at their limits
             forces = forces[n_others:]
         geoms = contact.geom  # from the plane to a ball or a link; a ball comes before a box
         if forces.size != 3 * len(geoms):

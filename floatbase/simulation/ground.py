@@ -21,6 +21,7 @@ from floatbase._validation import (
     cached_property,
     checked,
     numeric_copy,
+    one_or_each,
     read_only,
 )
 from floatbase.dynamics import UP
@@ -143,11 +144,9 @@ class Ground(Value):
         acceleration: Acceleration = None,
     ):
         normals, offsets = as_half_spaces("the ground", normal, offset)
-        given = numeric_copy(mu)
-        shape = () if given is None or given.ndim == 0 else (len(normals),)
-        mus = np.broadcast_to(as_array("mu of Ground", mu, shape), len(normals))
+        mus = one_or_each("mu of Ground", mu, len(normals), ())
         for i, each in enumerate(mus):
-            as_positive(f"mu of Ground for plane {i}" if shape else "mu of Ground", each)
+            as_positive(f"mu of Ground for plane {i}", float(each))
         vars(self).update(
             mus=read_only(mus),
             normals=normals,

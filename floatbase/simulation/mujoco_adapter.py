@@ -227,14 +227,15 @@ class MujocoAdapter:
             mujoco.mj_kinematics(model, data)
             for joint, name in zip(self._joints, robot.joint_names, strict=True):
                 body = model.jnt_bodyid[joint]
-                theirs = pin.SE3(data.xmat[body].reshape(3, 3), data.xanchor[joint])
+                if joint + 1 < model.body_jntadr[body] + model.body_jntnum[body]:
+                    continue  # the last joint of a body places it
+                R = data.xmat[body].reshape(3, 3)
+                theirs = pin.SE3(R, data.xpos[body] + R @ model.jnt_pos[joint])
                 ours = pin.SE3(state.joint_transforms[robot.model.getJointId(name)])
-                is_last = joint == model.body_jntadr[body] + model.body_jntnum[body] - 1
                 if mount is None:
-                    mount = theirs * ours.inverse() if is_last else None
-                    continue
+                    mount = theirs * ours.inverse()
                 difference = (mount * ours).actInv(theirs)
-                angle = float(np.linalg.norm(pin.log3(difference.rotation))) if is_last else 0.0
+                angle = float(np.linalg.norm(pin.log3(difference.rotation)))
                 distance = float(np.linalg.norm(difference.translation))
                 if max(angle, distance) > _LARGEST_DIFFERENCE:
                     raise InputError(

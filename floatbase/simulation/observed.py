@@ -98,7 +98,7 @@ class Observed:
         tau : ndarray, shape (d,)
             Motor torques of the last timestep [N·m].
         forces : ndarray, shape (points, 3)
-            Force of the last timestep on each contact point of the feet, in the world frame [N].
+            Force of the last timestep on each point of `sim.point_names`, world frame [N].
         """
         for part in (*self._observers, self._controller):
             measure = getattr(part, "measure", None)

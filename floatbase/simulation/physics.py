@@ -28,7 +28,7 @@ from floatbase.dynamics._compiled import acceleration_at
 from floatbase.errors import InputError, SimulationError
 from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
-from floatbase.simulation.build import body_name, build_model, build_spec
+from floatbase.simulation.build import body_name, build_model, build_spec, world_of
 from floatbase.simulation.connections import Connections, parts_of
 from floatbase.simulation.foot_contacts import FootContacts
 from floatbase.simulation.ground import Ground
@@ -117,13 +117,13 @@ class Simulation:
         contacts = self._feet if contacts is None else as_instance("contacts", contacts, Contacts)
         extra = parts_of(self._feet, contacts)
         self._contacts = self._feet + extra
-        self._build_options = self.ground, self.timestep, self.joint_losses, tuple(extra)
+        self._world = world_of(self.ground, self.timestep, self.joint_losses, extra)
         if self.ground.acceleration is not None and not robot.is_floating:
             raise InputError(
                 f"The ground accelerates, but {robot.name} has a fixed base, which is at rest. Use "
                 f"a robot with a floating base, or a ground without acceleration."
             )
-        self._model = build_model(robot, *self._build_options)
+        self._model = build_model(robot, self._world)
         self._connections = Connections(self.model, extra)
         self._gravity = self.model.opt.gravity.copy()
         # of the ground
@@ -327,12 +327,8 @@ class Simulation:
         SimulationError
             If another thread is using the simulation.
         """
-        state = (
-            standing_on(self.robot, self.ground)
-            if state is None
-            else as_instance("state", state, State)
-        )
-        if not self.robot.has_joints_of(state.robot):
+        state = standing_on(self.robot, self.ground) if state is None else state
+        if not self.robot.has_joints_of(as_instance("state", state, State).robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
                 f"{self.robot.name}. Give a state of that robot."
@@ -373,7 +369,7 @@ class Simulation:
         mujoco.MjSpec
             The description from which `model` was compiled. `sim.spec().to_xml()` is its XML.
         """
-        return build_spec(self.robot, *self._build_options)
+        return build_spec(self.robot, self._world)
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance the simulation by one timestep.
@@ -422,11 +418,8 @@ class Simulation:
         ndarray, shape (d,)
             Joint torques [N·m].
         """
-        return self._torques_of(self.data.actuator_force)
-
-    def _torques_of(self, actuator_force: Array) -> Array:
-        """Convert actuator forces of MuJoCo to joint torques, shape (..., d) [N·m]."""
-        return actuator_force[..., self._actuator_ids]
+        torques: Array = self.data.actuator_force[self._actuator_ids]
+        return torques
 
     def contact_forces(self) -> Array:
         """Return the contact forces on the robot during the last step.
@@ -486,13 +479,12 @@ class Simulation:
         bool
             Whether the contact exists. A contact with an acceleration needs a ground with one.
         """
-        is_moving = getattr(contact, "acceleration", None) is not None
-        if contact.name not in self.contacts.names or (
-            is_moving and self.ground.acceleration is None
-        ):
+        if contact.name not in self.contacts.names:
             return False
+        is_at_rest = getattr(contact, "acceleration", None) is None
         is_point = len(getattr(contact, "point_names", ())) == 1  # also in the middle of a sole
-        return is_point or contact.k == self.contacts[contact.name].k
+        is_alike = is_point or contact.k == self.contacts[contact.name].k
+        return is_alike and (is_at_rest or self.ground.acceleration is not None)
 
     def pushed_body(self, push: Push) -> int:
         """Return MuJoCo's id of the body that a push acts on.

@@ -365,8 +365,7 @@ class Recorder:
         self._step_connection_forces = np.zeros((ticks * substeps, sim.connections.k))
         self._ground_position = np.empty((ticks, 3))
         self._stances: list[Contacts] = []
-        self._planned_forces = np.empty((ticks, stance.k))
-        self._rows_with_plan: list[int] = []  # the rows that have planned forces
+        self._planned: list[Array | None] = []  # forces of each row
         # row, values and entries of each task of the controllers' targets
         self._targets: list[tuple[int, Array, Mapping[str, slice]]] = []
 
@@ -419,12 +418,7 @@ class Recorder:
             self._joint_limits = limits if isinstance(limits, JointLimits) else None
         self._tau_desired[n] = tau_desired
         self._stances.append(stance)
-        if planned is not None:
-            more = planned.size - self._planned_forces.shape[1]
-            if more > 0:  # larger than any stance before
-                self._planned_forces = np.pad(self._planned_forces, ((0, 0), (0, more)))
-            self._planned_forces[n, : planned.size] = planned
-            self._rows_with_plan.append(n)
+        self._planned.append(None if planned is None else planned.copy())
         self._n += 1
 
     def to_rollout(
@@ -447,15 +441,14 @@ class Recorder:
                     f"remain a flat foot."
                 )
         measured, positions = self._measured_at(contacts)
+        actuator_forces = self._step_actuator_forces[: self._n * self._substeps]
         return Rollout(
             self._sim.robot,
             contacts,
             time=self._complete_rows(self._time),
             q=self._complete_rows(self._q),
             v=self._complete_rows(self._v),
-            tau=self._mean_over_substeps(
-                self._sim._torques_of(self._step_actuator_forces[: self._n * self._substeps])
-            ),
+            tau=self._mean_over_substeps(actuator_forces[:, self._sim._actuator_ids]),
             tau_desired=self._complete_rows(self._tau_desired),
             planned=self._planned_at(contacts),
             measured=measured,
@@ -500,14 +493,15 @@ class Recorder:
     def _planned_at(self, contacts: Contacts) -> Array:
         """Return the planned forces at the contacts, shape (n, k) [N]."""
         forces, entries_of_all = np.full((self._n, contacts.k), np.nan), np.arange(contacts.k)
-        rows: dict[Contacts, list[int]] = {stance: [] for stance in self._stances}
-        for i in self._rows_with_plan:
-            rows[self._stances[i]].append(i)
+        rows: dict[Contacts, list[int]] = {}
+        for i, planned in enumerate(self._planned):
+            if planned is not None:
+                rows.setdefault(self._stances[i], []).append(i)
         for stance, stance_rows in rows.items():
             parts = [entries_of_all[contacts.force_slice(name)] for name in stance.names]
             entries = np.concatenate([entries_of_all[:0], *parts]).tolist()
             forces[stance_rows] = 0.0
-            forces[np.ix_(stance_rows, entries)] = self._planned_forces[stance_rows, : stance.k]
+            forces[np.ix_(stance_rows, entries)] = [self._planned[i] for i in stance_rows]
         return read_only(forces)
 
     def _measured_at(self, contacts: Contacts) -> tuple[Array, Array]:

@@ -168,12 +168,11 @@ def rollout(
             f"A duration of {duration:g} s has {steps} timesteps, but a record holds at most "
             f"{_MAX_STEPS}. Use several rollouts; each continues where the last one ended."
         )
-    warning = _inactive_push_warning(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
-    if warning:
-        warn(warning, SimulationWarning)
+    _warn_of_inactive(pushes, sim.time, sim.time + ticks * substeps * sim.timestep)
     stance = _current_stance(sim, controller)
     record = Recorder(sim, stance, ticks + settling_ticks, substeps)
-    missing = _warn_of_missing(sim, stance, set())
+    missing: set[str] = set()
+    _warn_of_missing(sim, stance, missing)
 
     def end(outcome: Outcome, error: FloatbaseError | None = None) -> Rollout:
         controller_off_time = sim.time
@@ -201,7 +200,7 @@ def rollout(
                 return end("controller failed", error)
             previous, stance = stance, _current_stance(sim, controller)
             if stance is not previous:
-                missing = _warn_of_missing(sim, stance, missing)
+                _warn_of_missing(sim, stance, missing)
             try:
                 desired = _desired_torques(sim, command)
                 planned = _planned_forces(command, stance)
@@ -235,10 +234,10 @@ def _period_count(name: str, time: float, unit: str, period: float, minimum: int
     return count
 
 
-def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -> str:
-    """Return a warning if there are pushes and none acts from `begin` to `end` [s], else ""."""
+def _warn_of_inactive(pushes: tuple[Push, ...], begin: float, end: float) -> None:
+    """Warn if there are pushes and none acts from `begin` to `end` [s]."""
     if not pushes or active_pushes(pushes, begin, end):
-        return ""
+        return
     first, what = pushes[0], "The push does not act during this rollout. It"
     if len(pushes) > 1:
         what = f"None of the {len(pushes)} pushes acts during this rollout. The first one"
@@ -246,9 +245,10 @@ def _inactive_push_warning(pushes: tuple[Push, ...], begin: float, end: float) -
         advice = f"Call sim.reset() to restart the clock, or use start=sim.time + {first.start:g}"
     else:
         advice = f"Use a duration of more than {first.start - begin:g} s"
-    return (
+    warn(
         f"{what} acts from {first.start:g} to {first.start + first.duration:g} s, but the rollout "
-        f"goes from {begin:g} to {end:g} s. {advice}."
+        f"goes from {begin:g} to {end:g} s. {advice}.",
+        SimulationWarning,
     )
 
 
@@ -301,19 +301,19 @@ def _current_stance(sim: Simulation, controller: Controller) -> Contacts:
     return contacts if isinstance(contacts, Contacts) else sim.feet
 
 
-def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> set[str]:
-    """Warn about contacts that the simulation lacks; return them and the known ones."""
-    missing = {contact.name for contact in stance if not sim.has(contact)}
-    if missing - known:
+def _warn_of_missing(sim: Simulation, stance: Contacts, known: set[str]) -> None:
+    """Warn about contacts that the simulation lacks, and add them to the known ones."""
+    missing = {contact.name for contact in stance if not sim.has(contact)} - known
+    known |= missing
+    if missing:
         warn(
-            f"The controller relies on {', '.join(sorted(missing - known))}, but the simulation "
+            f"The controller relies on {', '.join(sorted(missing))}, but the simulation "
             f"lacks them. Use fb.Simulation(robot, contacts=controller.contacts). It can have "
             f"points, flat feet and wheels at any frame, fixed frames and rigid connections. "
             f"Moving contacts need fb.Ground(acceleration=…). Other constraints exist only in the "
             f"controller.",
             SimulationWarning,
         )
-    return known | missing
 
 
 def _run_substeps(

@@ -152,6 +152,15 @@ def test_a_fixed_frame_is_fixed_in_the_simulation_with_the_planned_wrench(feet):
     assert np.abs(run.measured - run.planned)[-100:].max() < 2e-3 * GO2.weight
 
 
+def test_a_fixed_frame_of_a_fixed_base_takes_no_force():
+    robot = judges.load("ur5")
+    contacts = fb.Contacts([fixed_frame("base_link"), fixed_frame("tool0")])
+    sim = fb.Simulation(robot, contacts=contacts)
+    sim.step(np.zeros(robot.d))
+    base, tool = sim.connection_forces().reshape(2, 6)
+    assert not base.any() and np.linalg.norm(tool[:3]) > 1.0
+
+
 def test_a_rollout_warns_about_contacts_that_the_simulation_lacks():
     robot = GO2
     calf = fb.Contacts.points(robot, frames=["FL_calf"])

@@ -17,7 +17,7 @@ from floatbase.simulation import MujocoAdapter
 
 LEG = """
 <body name="{leg}_hip" pos="{x} {y} 0">
-  <joint name="{leg}_roll" axis="1 0 0" range="-1 1"/>
+  <joint name="{leg}_slide" type="slide" axis="1 0 0" range="-1 1"/>
   <inertial pos="0 0 0" mass="0.5" diaginertia="1e-3 1e-3 1e-3"/>
   <body name="{leg}_thigh" pos="0 {y} 0" quat="0.98 0 0.199 0">
     <joint name="{leg}_pitch" axis="0 1 0" pos="0 0 0.02" range="-2 2"/>
@@ -30,7 +30,7 @@ PLACES = {"FR": (0.2, -0.1), "RL": (-0.2, 0.1), "FL": (0.2, 0.1), "RR": (-0.2, -
 LEGS = "".join(LEG.format(leg=leg, x=x, y=y) for leg, (x, y) in PLACES.items())
 MOTORS = "".join(
     f'<motor name="{leg}_{joint}" joint="{leg}_{joint}" gear="{gear}" ctrlrange="-9 9"/>'
-    for joint, gear in (("pitch", -3.0), ("roll", 2.0))
+    for joint, gear in (("pitch", -3.0), ("slide", 2.0))
     for leg in PLACES
 )
 DOG = f"""
@@ -105,21 +105,21 @@ def test_torques_reach_the_joints_of_their_names_through_gears_of_any_sign(dog):
 
 
 def with_servo(spec: mujoco.MjSpec) -> None:
-    spec.actuator("RL_roll").set_to_position(kp=10.0)
+    spec.actuator("RL_slide").set_to_position(kp=10.0)
 
 
 def without_motor(spec: mujoco.MjSpec) -> None:
-    spec.delete(spec.actuator("RL_roll"))
+    spec.delete(spec.actuator("RL_slide"))
 
 
 def with_two_motors(spec: mujoco.MjSpec) -> None:
-    spec.add_actuator(target="RL_roll", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    spec.add_actuator(target="RL_slide", trntype=mujoco.mjtTrn.mjTRN_JOINT)
 
 
 @pytest.mark.parametrize("change", [with_servo, without_motor, with_two_motors])
 def test_a_joint_without_its_own_torque_motor_is_named(dog, change):
     model = scene("a/", change=change)
-    with raises(InputError, "a/RL_roll"):
+    with raises(InputError, "a/RL_slide"):
         MujocoAdapter(dog, model).set_torques(mujoco.MjData(model), np.zeros(dog.d))
 
 
@@ -143,14 +143,14 @@ def test_a_joint_that_moves_its_link_differently_is_named(dog, change):
 
 def test_swapped_and_missing_and_ambiguous_names_are_refused(dog):
     swapped = [f"a/{name[0]}{'LR'[name[1] == 'L']}{name[2:]}" for name in dog.joint_names]
-    with raises(InputError, "FL_roll", "a/FR_roll"):
+    with raises(InputError, "FL_slide", "a/FR_slide"):
         MujocoAdapter(dog, scene("a/"), swapped)
-    with raises(UnknownNameError, "FL_roll"):
+    with raises(UnknownNameError, "FL_slide"):
         MujocoAdapter(dog, scene())
-    with raises(InputError, "a/FL_roll", "b/FL_roll"):
+    with raises(InputError, "a/FL_slide", "b/FL_slide"):
         MujocoAdapter(dog, scene("a/", "b/"))
     with raises(InputError, 8):
-        MujocoAdapter(dog, scene("a/"), ["a/FL_roll"])
+        MujocoAdapter(dog, scene("a/"), ["a/FL_slide"])
     with raises(InputError, "MjModel"):
         MujocoAdapter(dog, mujoco.MjData(scene("a/")))
     small, large = scene("a/"), scene("a/", "b/")
