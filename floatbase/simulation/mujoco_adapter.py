@@ -225,8 +225,12 @@ class MujocoAdapter:
             self.set_state(data, state)
             mujoco.mj_kinematics(model, data)
             for joint, name in zip(self._joints, robot.joint_names, strict=True):
-                body = model.jnt_bodyid[joint]
-                theirs = pin.SE3(data.xmat[body].reshape(3, 3), data.xanchor[joint])
+                body, entry = model.jnt_bodyid[joint], model.jnt_qposadr[joint]
+                # MuJoCo does not move the anchor of a sliding joint with the joint itself
+                is_sliding = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
+                moved = data.qpos[entry] - model.qpos0[entry] if is_sliding else 0.0
+                anchor = data.xanchor[joint] + moved * data.xaxis[joint]
+                theirs = pin.SE3(data.xmat[body].reshape(3, 3), anchor)
                 ours = pin.SE3(state.joint_transforms[robot.model.getJointId(name)])
                 is_last = joint == model.body_jntadr[body] + model.body_jntnum[body] - 1
                 if mount is None:
