@@ -48,7 +48,7 @@ class Observed:
     *observers : callable
         Functions observe(q, v, t) -> (q, v), such as `SensorNoise`, `Latency` or your own state
         estimator. Each gets what the one before it returns; the first gets the true state. One with
-        a method `measure(tau, forces)` also gets torques and contact forces (see `measure`).
+        a method `measure(tau, forces, acceleration)` also gets other measurements (see `measure`).
 
     Raises
     ------
@@ -87,7 +87,7 @@ class Observed:
         """The observers, in the order in which they are called."""
         return self._observers
 
-    def measure(self, tau: Array, forces: Array) -> None:
+    def measure(self, tau: Array, forces: Array, acceleration: Array) -> None:
         """Pass measurements to the observers and the controller that have a method `measure`.
 
         `rollout` calls this method before each control step.
@@ -98,11 +98,15 @@ class Observed:
             Motor torques of the last timestep [N·m].
         forces : ndarray, shape (points, 3)
             Force of the last timestep on each contact point of the feet, in the world frame [N].
+        acceleration : ndarray, shape (3,)
+            What an accelerometer in the base measured, in the base frame [m/s²]: the acceleration
+            of the base's origin minus gravity, at the beginning of the last timestep. Before the
+            first timestep it is that of the robot without motor torques.
         """
         for part in (*self._observers, self._controller):
             measure = getattr(part, "measure", None)
             if measure is not None:
-                measure(tau, forces)
+                measure(tau, forces, acceleration)
 
     def observe(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         """Return the state that the controller gets.
