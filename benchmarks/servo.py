@@ -49,7 +49,7 @@ def error(motion: str, carrier: fb.Robot, stiffness: float, leak: float, delays:
     sim.reset(STANDING)
     run = fb.rollout(sim, controller, DURATION, control_period=PERIOD, actuators=servo)
     height = run.q[len(run) // 2 :, 2].mean() - STANDING.q[2]
-    return f"{1000.0 * height:.0f}" if run.outcome == "completed" else "fell"
+    return str(round(1000.0 * height)) if run.outcome == "completed" else "fell"
 
 
 if __name__ == "__main__":
