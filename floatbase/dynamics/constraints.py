@@ -28,7 +28,7 @@ from floatbase.dynamics._compiled import (
     FrameMotion,
     as_acceleration,
 )
-from floatbase.dynamics.contact import DEFAULT_MU, UP, MotionConstraint, SinglePointContact
+from floatbase.dynamics.contact import DEFAULT_MU, UP, SinglePointContact
 from floatbase.errors import InputError
 from floatbase.robots import State
 
@@ -297,16 +297,3 @@ def rigid_between(frame: str, other: str) -> LinearConstraint:
     if frame == other:
         raise InputError(f"Both frames are {frame!r}. Name two frames of different links.")
     return LinearConstraint(f"connection of {frame} and {other}", 6, function)
-
-
-def connected_frames(contact: MotionConstraint) -> tuple[str, ...]:
-    """Return the two frames that a constraint connects rigidly, or () for another constraint.
-
-    The second frame of a fixed frame is "universe", Pinocchio's name of the world.
-    """
-    function = contact.function if isinstance(contact, LinearConstraint) else None
-    if isinstance(function, FrameConnection):
-        return function.frame, function.other
-    if isinstance(function, FrameMotion) and function.acceleration is None:
-        return function.frame, "universe"
-    return ()

@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase.dynamics import Contacts, FlatFootContact, MotionConstraint, RollingWheel
-from floatbase.dynamics.constraints import connected_frames
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.errors import SimulationError
 from floatbase.robots import Robot
 from floatbase.simulation._conversion import rotation_matrix

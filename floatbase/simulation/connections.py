@@ -7,7 +7,7 @@ import numpy as np
 
 from floatbase._validation import Array
 from floatbase.dynamics import Contacts, FlatFootContact, PointContact, RollingWheel
-from floatbase.dynamics.constraints import connected_frames
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.robots import State
 
 

@@ -461,8 +461,8 @@ class Simulation:
         acceleration = -self.model.opt.gravity  # plus that of the ground, in whose frame data is
         if self.robot.is_floating:
             acceleration = acceleration + self.data.qacc[self._conversion.qvel_of_v[:3]]
-        rotation: Array = self.data.xmat[self._base_body].reshape(3, 3)
-        return rotation.T @ acceleration
+        measured: Array = self.data.xmat[self._base_body].reshape(3, 3).T @ acceleration
+        return measured
 
     def contact_positions(self) -> Array:
         """Return the positions of the contact points: the point of each ball nearest to the ground.

@@ -12,7 +12,7 @@ from scipy.spatial.distance import pdist
 from floatbase._validation import Array, as_instance, cached_property
 from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FlatFootContact
-from floatbase.dynamics.constraints import connected_frames
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.viewer.scene import geometry, markers, shapes, threejs
@@ -108,8 +108,8 @@ class Painter:
         if kinds & {"measured", "planned", "cone", "push", "wrench"}:
             on_ground |= self._scale_bar(ground)
         if moved.any():
-            at = shapes.transform(moved)
-            on_ground = {p: item._replace(matrix=at @ item.matrix) for p, item in on_ground.items()}
+            shift = shapes.transform(moved)
+            on_ground = {p: Item(s, shift @ matrix, c) for p, (s, matrix, c) in on_ground.items()}
         return on_ground | picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
