@@ -3,6 +3,7 @@
 import dataclasses
 import pickle
 from importlib import import_module
+from pathlib import Path
 
 import judges
 import numpy as np
@@ -18,6 +19,7 @@ PACKAGES = (
     *("actuators", "affine", "behaviours", "control", "dynamics", "friction", "objectives"),
     *("playground", "qp", "robots", "simulation", "viewer"),
 )
+URDF = next((Path(__file__).parents[1] / "assets" / "models").glob("*.urdf"))
 CASES = {
     "a task": (lambda c: fb.CoMTask(c.robot.standing().com, kP=1.0), "kP", "kp"),
     "a simulation": (lambda c: fb.Simulation(c.robot, dt=1e-3), "dt", "timestep"),
@@ -29,6 +31,8 @@ CASES = {
     "another controller": (lambda c: c.replace(inequality=[]), "inequality", "inequalities"),
     "other tasks": (lambda c: c.replace(task=[]), "task", "tasks"),
     "a walk": (lambda c: Walk(c.robot, c.contacts, velocty=1.0), "velocty", "velocity"),
+    "a robot": (lambda c: fb.load(c.robot.name, postur=[0.0]), "postur", "posture"),
+    "a robot's file": (lambda c: fb.load(URDF, floatin=False), "floatin", "floating"),
     "a function": (lambda c: fb.rollout(None, c, 1.0, push=[]), "push", "pushes"),
 }
 

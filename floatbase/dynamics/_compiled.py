@@ -72,3 +72,16 @@ class FrameConnection:
         A[:3] += pin.skew(arm) @ of_other[3:]
         b[:3] += cross(drift_other[3:], arm) + cross(v_other[3:], v[:3] - v_other[:3])
         return A, b
+
+
+def connected_frames(contact: object) -> tuple[str, ...]:
+    """Return the two frames that a constraint connects rigidly, or () for another constraint.
+
+    The second frame of a fixed frame is "universe", Pinocchio's name of the world.
+    """
+    function = getattr(contact, "function", None)
+    if isinstance(function, FrameConnection):
+        return function.frame, function.other
+    if isinstance(function, FrameMotion) and function.acceleration is None:
+        return function.frame, "universe"
+    return ()

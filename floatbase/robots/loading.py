@@ -17,7 +17,14 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from floatbase._validation import Array, as_bool, as_string, as_strings, short_repr
-from floatbase.errors import InputError, RobotWarning, UnknownNameError, unknown_name, warn
+from floatbase.errors import (
+    InputError,
+    RobotWarning,
+    UnknownNameError,
+    check_arguments,
+    unknown_name,
+    warn,
+)
 from floatbase.robots._checks import as_posture, clamp_to_limits, has_floating_base, with_angles
 from floatbase.robots.catalogue_data import CATALOGUE, CatalogueEntry
 from floatbase.robots.couplings import lock_coupled_joints, read_couplings, with_followers_placed
@@ -121,11 +128,10 @@ def load(
 
     name = str(name) if isinstance(name, Path) else name
     load_file = _file_loader(name)
-    known = signature(load_file).parameters if load_file else ()
-    unknown = [option for option in file_options if option not in known]
-    if unknown:
-        kind = f"fb.{load_file.__name__}" if load_file else "A robot that is loaded by its name"
-        raise InputError(f"{kind} has no option {', '.join(unknown)}. Leave it out.")
+    function = load_file or load
+    known = signature(function).parameters.keys() - {"path", "file_options"}
+    known = known if load_file else known - {"name"}
+    check_arguments(function.__name__, file_options, known)
     if load_file is not None:
         return load_file(
             name,

@@ -18,11 +18,11 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase.dynamics import Contacts, FlatFootContact, MotionConstraint, RollingWheel
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.errors import SimulationError
 from floatbase.robots import Robot
 from floatbase.simulation._conversion import rotation_matrix
 from floatbase.simulation.agreement import check_agreement
-from floatbase.simulation.connections import connected_frames
 from floatbase.simulation.ground import Ground
 from floatbase.simulation.hulls import link_hulls
 

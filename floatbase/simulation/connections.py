@@ -7,29 +7,9 @@ import numpy as np
 import pinocchio as pin
 
 from floatbase._validation import Array
-from floatbase.dynamics import (
-    Contacts,
-    FlatFootContact,
-    LinearConstraint,
-    MotionConstraint,
-    PointContact,
-    RollingWheel,
-)
-from floatbase.dynamics._compiled import FrameConnection, FrameMotion
+from floatbase.dynamics import Contacts, FlatFootContact, PointContact, RollingWheel
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.robots import State
-
-
-def connected_frames(contact: MotionConstraint) -> tuple[str, ...]:
-    """Return the two frames that a constraint connects rigidly, or () for another constraint.
-
-    The second frame of a fixed frame is "universe", Pinocchio's name of the world.
-    """
-    function = contact.function if isinstance(contact, LinearConstraint) else None
-    if isinstance(function, FrameConnection):
-        return function.frame, function.other
-    if isinstance(function, FrameMotion) and function.acceleration is None:
-        return function.frame, "universe"
-    return ()
 
 
 def parts_of(feet: Contacts, contacts: Contacts) -> Contacts:

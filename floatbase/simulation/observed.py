@@ -48,8 +48,8 @@ class Observed:
     *observers : callable
         Functions observe(q, v, t) -> (q, v), such as `SensorNoise`, `Latency` or your own state
         estimator. The first observer gets the true state, and each other one gets what the observer
-        before it returns. An observer with a method `measure(tau, forces)` also gets torques and
-        contact forces (see `measure`).
+        before it returns. An observer with a method `measure(tau, forces, acceleration)` also gets
+        other measurements (see `measure`).
 
     Raises
     ------
@@ -88,7 +88,7 @@ class Observed:
         """The observers, in the order in which they are called."""
         return self._observers
 
-    def measure(self, tau: Array, forces: Array) -> None:
+    def measure(self, tau: Array, forces: Array, acceleration: Array) -> None:
         """Pass measurements to the observers and the controller that have a method `measure`.
 
         `rollout` calls this method before each control step.
@@ -99,11 +99,15 @@ class Observed:
             Motor torques of the last timestep [N·m].
         forces : ndarray, shape (points, 3)
             Force of the last timestep on each point of `sim.point_names`, world frame [N].
+        acceleration : ndarray, shape (3,)
+            What an accelerometer in the base measured, in the base frame [m/s²]: the acceleration
+            of the base's origin minus gravity, at the beginning of the last timestep. Before the
+            first timestep, it is that of the robot without motor torques.
         """
         for part in (*self._observers, self._controller):
             measure = getattr(part, "measure", None)
             if measure is not None:
-                measure(tau, forces)
+                measure(tau, forces, acceleration)
 
     def observe(self, q: Array, v: Array, t: float) -> tuple[Array, Array]:
         """Return the state that the controller gets.

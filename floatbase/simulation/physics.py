@@ -443,6 +443,21 @@ class Simulation:
         """Convert contacts of N instants to forces, shape (N, points, 3), world frame [N]."""
         return self.foot_contacts.forces(geoms, contact_frame_forces)
 
+    def accelerometer(self) -> Array:
+        """Return what an accelerometer in the base measured at the beginning of the last step.
+
+        Returns
+        -------
+        ndarray, shape (3,)
+            Acceleration of the base's origin minus gravity, in the base frame [m/s²]. At rest on
+            level ground it is (0, 0, 9.81).
+        """
+        acceleration = -self.model.opt.gravity  # plus that of the ground, in whose frame data is
+        if self.robot.is_floating:
+            acceleration = acceleration + self.data.qacc[self._conversion.qvel_of_v[:3]]
+        measured: Array = self.data.xmat[self._base_body].reshape(3, 3).T @ acceleration
+        return measured
+
     def contact_positions(self) -> Array:
         """Return the positions of the contact points: the point of each ball nearest to the ground.
 

@@ -46,9 +46,10 @@ class Controller(Protocol):
     The result has an attribute `tau`, shape (d,) [N·m], and optionally `forces`, shape (k,) [N], in
     the world frame. The controller itself may have an attribute `contacts` of type `Contacts`: the
     stance of its last result, which may change from one control step to the next. Without this
-    attribute, all feet are used. If it has a method `measure(tau, forces)`, `rollout` calls it
-    before each control step with the measurements of the last timestep: the motors' torques, shape
-    (d,) [N·m], and the forces on `sim.point_names`, shape (points, 3), in the world frame [N].
+    attribute, all feet are used. If it has a method `measure(tau, forces, acceleration)`, `rollout`
+    calls it before each control step with the measurements of the last timestep: the motors'
+    torques, shape (d,) [N·m], the forces on `sim.point_names`, shape (points, 3), in the world
+    frame [N], and the accelerometer, shape (3,), in the base frame [m/s²].
     """
 
     def __call__(self, q: Array, v: Array, t: float) -> Any:
@@ -194,7 +195,7 @@ def rollout(
             record.before_tick(t, q, v)
             try:
                 if measure is not None:
-                    measure(sim.torques(), sim.contact_forces())
+                    measure(sim.torques(), sim.contact_forces(), sim.accelerometer())
                 command = controller(q, v, t)
             except (InfeasibleError, SolverError) as error:
                 return end("controller failed", error)

@@ -173,10 +173,11 @@ class Viewer(Controls, Output):
             State of the robot.
         contacts : Contacts, optional
             Contacts of the robot; each gets a patch and a friction cone.
-        forces : array_like, shape (3 n,) or (n, 3), optional
+        forces : array_like, shape (3 n,), (n, 3) or (k,), optional
             Measured forces of the ground on the robot at the n points of `contacts`, in the world
-            frame [N].
-        planned : array_like, shape (3 n,) or (n, 3), optional
+            frame [N], or all entries of λ. Then fixed frames and rigid connections get an arrow at
+            their first frame, too, without the moment.
+        planned : array_like, shape (3 n,), (n, 3) or (k,), optional
             The controller's planned forces, in the same form [N]. The colour of a cone shows where
             its force lies: the one in `forces` if given, else the one in `planned`.
         title : str, optional
@@ -185,7 +186,7 @@ class Viewer(Controls, Output):
             Name of the ghost in the legend.
         **options
             What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
-            extra, swing_feet, joint_limits, qdd. `PictureOptions` describes them.
+            extra, swing_feet, joint_limits, qdd, ground_position. `PictureOptions` describes them.
 
         Returns
         -------
@@ -399,9 +400,9 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         **options
-            As for `show`. The rollout itself determines `push`, `swing_feet` and, unless they are
-            given, `joint_limits` and `qdd`. Steps, stairs and other boxes of its ground are drawn
-            unless the viewer has a ground.
+            As for `show`. The rollout itself determines `push`, `swing_feet`, `ground_position`
+            and, unless they are given, `joint_limits` and `qdd`. Steps, stairs and other boxes of
+            its ground are drawn unless the viewer has a ground.
 
         Returns
         -------
@@ -427,19 +428,23 @@ class Viewer(Controls, Output):
         planned_steps = gait_overlay.as_steps(steps)
         states = [State(self.robot, rollout.q[i], rollout.v[i]) for i in rows]
         times = rollout.time[rows].tolist()
-        contacts, columns = recording.point_force_contacts(rollout.contacts)
         pictures = []
         for i, t, state in zip(rows, times, states, strict=True):
             overlay: Picture = dict(options.get("extra") or {})
             if (step := gait_overlay.step_at(planned_steps, t)) is not None:
                 overlay |= self.step_overlay(step, t, state)
-            measured, plan = rollout.measured[i, columns], rollout.planned[i, columns]
-            shown_plan = plan if planned and np.isfinite(plan).all() else None
+            # NaN where the simulation has nothing, or in a row without a plan
+            measured, plan = np.nan_to_num([rollout.measured[i], rollout.planned[i]])
             chosen: PictureKeywords = {**options, "extra": overlay}
             chosen["push"] = recording.push_at(rollout, i)
             chosen["swing_feet"] = recording.swing_feet_at(rollout, i)
+            if rollout.ground_position is not None:
+                chosen["ground_position"] = rollout.ground_position[i]
             chosen = cast(PictureKeywords, recording.joint_limits_at(rollout, i) | dict(chosen))
-            pictures.append(self.painter.picture(state, contacts, measured, shown_plan, **chosen))
+            shown_plan = plan if planned else None
+            pictures.append(
+                self.painter.picture(state, rollout.contacts, measured, shown_plan, **chosen)
+            )
         if follow and self.robot.is_floating:
             bases = np.array([state.joint_transforms[1][:3, 3] for state in states])
             places = recording.smoothed(times, bases)

@@ -195,7 +195,8 @@ def test_a_rollout_warns_when_a_contact_that_the_simulation_lacks_begins():
 
 
 def test_a_foot_may_be_any_frame_of_a_link():
-    robot = fb.load("go2", feet=[f"{leg}_foot_joint" for leg in ("FL", "FR", "RL", "RR")])
+    made = fb.load("go2", feet=[f"{leg}_foot_joint" for leg in ("FL", "FR", "RL", "RR")])
+    robot = replace(made, package_dirs=())  # no hulls
     sim = fb.Simulation(robot)
     run = fb.rollout(sim, controller_of(fb.Contacts.feet(robot), robot), 0.05)
     assert run.outcome == "completed" and np.abs(run.foot_positions[..., 2]).max() < 1e-3

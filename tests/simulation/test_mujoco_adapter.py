@@ -93,6 +93,37 @@ def test_feet_and_kinetic_energy_of_the_robot_in_the_scene_are_those_of_the_stat
     assert np.allclose(data.body("ball").xpos, [1.0, 0.0, 2.0])
 
 
+CRANE = """
+<mujoco><worldbody>
+  <body name="trolley">
+    <joint name="along" type="slide" axis="1 0 0"/>
+    <joint name="up" type="slide" axis="0 0 1" ref="1.3"/>
+    <joint name="turn" axis="0 0 1" pos="0 0.1 0"/>
+    <geom size="0.1"/>
+    <body name="arm" pos="0.2 0 0">
+      <joint name="reach" type="slide" axis="1 0 0" pos="0.05 0 0"/>
+      <geom size="0.1" pos="0.1 0 0"/>
+      <body name="tip" pos="0.3 0 0"><joint name="wrist" axis="0 1 0"/><geom size="0.1"/></body>
+    </body>
+  </body>
+</worldbody></mujoco>
+"""
+
+
+def test_sliding_joints_and_several_joints_of_one_body_are_found_where_they_are(tmp_path):
+    (tmp_path / "crane.xml").write_text(CRANE)
+    crane = fb.load_mjcf(tmp_path / "crane.xml", floating=False)
+    model = mujoco.MjModel.from_xml_string(CRANE)
+    adapter, data = MujocoAdapter(crane, model), mujoco.MjData(model)
+    for seed in range(10):
+        adapter.set_state(data, state := crane.random_state(seed))
+        mujoco.mj_kinematics(model, data)
+        assert np.allclose(data.body("tip").xpos, state.point("tip"), atol=1e-12)
+    other = CRANE.replace('"reach" type="slide" axis="1 0 0"', '"reach" type="slide" axis="0 1 0"')
+    with raises(InputError, "reach"):
+        MujocoAdapter(crane, mujoco.MjModel.from_xml_string(other))
+
+
 def test_torques_reach_the_joints_of_their_names_through_gears_of_any_sign(dog):
     model = scene("dog_")
     adapter, data = MujocoAdapter(dog, model), mujoco.MjData(model)

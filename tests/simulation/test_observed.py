@@ -48,14 +48,15 @@ def test_a_controller_gets_what_the_observers_return_one_after_the_other():
 
 
 class Scales:
-    """An observer that keeps the measured torques and forces."""
+    """An observer that keeps what is measured."""
 
     def __init__(self) -> None:
-        self.tau, self.forces = [], []
+        self.tau, self.forces, self.accelerations = [], [], []
 
-    def measure(self, tau: np.ndarray, forces: np.ndarray) -> None:
+    def measure(self, tau: np.ndarray, forces: np.ndarray, acceleration: np.ndarray) -> None:
         self.tau.append(tau)
         self.forces.append(forces)
+        self.accelerations.append(acceleration)
 
     def __call__(self, q: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         return q, v
@@ -70,6 +71,27 @@ def test_observers_get_the_torques_and_the_contact_forces_of_the_last_timestep()
     weight = judges.load("go2").weight
     assert np.allclose(np.sum(outer.forces, axis=1)[-20:], [0.0, 0.0, weight], atol=0.05 * weight)
     assert np.array_equal(outer.tau, inner.tau)
+
+
+@pytest.mark.parametrize("acceleration", [None, [2.0, -1.0, 3.0]], ids=["at rest", "moving"])
+def test_the_accelerometer_measures_the_change_of_velocity_and_gravity(acceleration):
+    robot, scales = judges.load("go2"), Scales()
+    walk = Walk(robot, judges.stance(robot), Gait.trot(robot, start=0.0), velocity=[0.5, 0.1])
+    sim = fb.Simulation(robot, fb.Ground(acceleration=acceleration), timestep=5e-4)
+    run = fb.rollout(sim, Observed(walk, scales), 0.2)
+    R = np.array([run.state(i).frame_pose("base").rotation for i in range(len(run))])
+    rates = np.diff(np.einsum("nij,nj->ni", R, run.v[:, :3]), axis=0) / sim.timestep
+    expected = np.einsum("nji,nj->ni", R[:-1], rates + [0.0, 0.0, robot.gravity])
+    assert np.allclose(scales.accelerations[1:], expected, atol=1e-6)
+
+
+def test_an_accelerometer_measures_gravity_in_a_fixed_base_and_nothing_in_free_fall():
+    arm, dog = judges.load("ur5"), judges.load("go2")
+    R = arm.standing().frame_pose(arm.base).rotation
+    assert np.allclose(fb.Simulation(arm).accelerometer(), R.T @ [0.0, 0.0, arm.gravity])
+    sim, state = fb.Simulation(dog), dog.standing()
+    sim.reset(state.replace(q=np.r_[0.0, 0.0, 1.0, 0.5, 0.5, 0.5, 0.5, state.q[7:]]))
+    assert np.allclose(sim.accelerometer(), 0.0, atol=1e-9)
 
 
 @pytest.mark.front_end  # three seconds

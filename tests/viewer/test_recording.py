@@ -13,7 +13,7 @@ from messages import raises, refused
 from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
-from floatbase.dynamics import Contacts, LinearConstraint
+from floatbase.dynamics import Contacts, LinearConstraint, fixed_frame, rigid_between
 from floatbase.errors import InputError, UnknownNameError, ViewerError
 from floatbase.robots import State, catalogue, load
 from floatbase.simulation import Push, Rollout
@@ -89,6 +89,39 @@ def test_a_record_with_a_constraint_that_has_no_points_plays_without_it(viewer, 
     viewer.play(dataclasses.replace(made, contacts=contacts, measured=forces, planned=forces))
     drawn = {path for path in viewer.renderer.picture if path.startswith("measured/")}
     assert drawn == {f"measured/{name}" for name in made.contacts.names}
+
+
+def test_the_ground_of_a_record_moves_and_takes_its_boxes_and_projections_along(viewer, go2):
+    made = record(go2, 0.2)
+    path = np.outer(np.linspace(0.0, 1.0, len(made)), [0.3, -0.2, 0.1])
+    ground = fb.Ground.stairs(1, 0.1, start=0.5)
+    viewer.play(dataclasses.replace(made, ground=ground, ground_position=path), follow=False)
+    moving = tracks(viewer)
+    for item in ("ground", "terrain/faces", "scale/label"):
+        times, places = moving[item, ".position"]
+        rows = np.round(times / 1e-3).astype(int)
+        assert_allclose(places - places[0], path[rows], atol=1e-6)
+    assert_allclose(moving["com/projection", ".position"][1][:, 2], path[rows, 2], atol=1e-6)
+    assert_allclose(moving["com/ball", ".position"][1], made.com[rows], atol=1e-6)
+    viewer.show(made.state(0), ground_position=path[-1])
+    assert_allclose(viewer.renderer.picture["ground"].matrix[:3, 3], path[-1])
+
+
+def test_fixed_frames_and_rigid_connections_have_arrows_at_their_first_frames(viewer, go2):
+    made = record(go2, 0.2)
+    pair = rigid_between("FL_calf", "FR_calf"), fixed_frame("base")
+    wrenches = np.array([10.0, 20.0, 30.0, 1.0, 1.0, 1.0, 0.0, 0.0, 50.0, 1.0, 1.0, 1.0])
+    measured = np.hstack([made.measured, np.tile(wrenches, (len(made), 1))])
+    planned = np.where(np.arange(measured.shape[1]) < 15, np.nan, measured)
+    contacts = made.contacts + Contacts(pair)
+    run = dataclasses.replace(made, contacts=contacts, measured=measured, planned=planned)
+    viewer.play(run)
+    assert f"planned/{pair[1].name}" in viewer.renderer.picture
+    viewer.show(run.state(0), contacts, measured[0])
+    for each, frame, force in zip(pair, ("FL_calf", "base"), wrenches.reshape(2, 6), strict=True):
+        arrow = viewer.renderer.picture[f"measured/{each.name}"].matrix
+        assert_allclose(arrow[:3, 2], viewer.scale * force[:3])
+        assert_allclose(arrow[:3, 3], run.state(0).point(frame))
 
 
 def test_a_record_is_thinned_to_thirty_pictures_a_second():

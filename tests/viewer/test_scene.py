@@ -391,6 +391,7 @@ def test_wrong_input_is_refused_by_name(viewer, go2, standing, contacts):
         (lambda: viewer.show(standing, forces=np.zeros(12)), "forces", "contacts"),
         (lambda: viewer.show(standing, contacts, np.zeros(9)), "forces", 9, 12),
         (lambda: viewer.show(standing, contacts, planned=np.full(12, np.nan)), "planned", np.nan),
+        (lambda: viewer.show(standing, ground_position=[0.0, 1.0]), "ground_position", 3, 2),
         (lambda: viewer.camera("above"), "above", "front"),
         (lambda: viewer.camera(90.0), 90, "View"),
         (lambda: Viewer("go2"), "robot", "Robot", "go2"),

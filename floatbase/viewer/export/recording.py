@@ -19,7 +19,6 @@ from floatbase._validation import (
     as_string,
     short_repr,
 )
-from floatbase.dynamics import Contacts, FrictionContact
 from floatbase.errors import InputError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.shapes import Item, Picture, with_normal_paths
@@ -133,15 +132,6 @@ def push_at(rollout: Rollout, row: int, linger: float = 0.0) -> tuple[str, Array
         if push.acts_at(now) or 0.0 <= now - push.start < push.duration + linger - 1e-9:
             return push.frame, push.force
     return None
-
-
-def point_force_contacts(contacts: Contacts) -> tuple[Contacts, npt.NDArray[np.bool_]]:
-    """Select the contacts whose forces act at points; the others cannot be drawn."""
-    as_instance("contacts", contacts, Contacts)
-    drawn = np.array([isinstance(c, FrictionContact) for c in contacts], dtype=bool)
-    names = [contact.name for contact, there in zip(contacts, drawn, strict=True) if there]
-    sizes = np.array([contact.k for contact in contacts], dtype=int)
-    return contacts.only(*names), np.repeat(drawn, sizes)
 
 
 def swing_feet_at(rollout: Rollout, row: int) -> frozenset[str]:

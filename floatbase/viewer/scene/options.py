@@ -31,6 +31,7 @@ class PictureKeywords(TypedDict, total=False):
     swing_feet: frozenset[str]
     joint_limits: bool | JointLimits
     qdd: npt.ArrayLike | None
+    ground_position: npt.ArrayLike
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -72,6 +73,8 @@ class PictureOptions:
     qdd : array_like, shape (nv,), or None
         Accelerations that the controller planned in this state, such as `command.qdd` [m/s²
         or rad/s²]. A joint limit is active if a planned acceleration is at its bound.
+    ground_position : array_like, shape (3,)
+        How far the ground has moved, in the world frame [m], as in `Simulation.ground_position`.
 
     Raises
     ------
@@ -92,6 +95,7 @@ class PictureOptions:
     swing_feet: frozenset[str] = frozenset()
     joint_limits: bool | JointLimits = True
     qdd: npt.ArrayLike | None = None
+    ground_position: npt.ArrayLike = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("com", "cones", "arrows", "support", "labels"):
@@ -113,6 +117,7 @@ class PictureOptions:
             as_bool("joint_limits", self.joint_limits)
         if self.qdd is not None:
             as_array("qdd", self.qdd, (None,), "m/s² or rad/s²")
+        as_array("ground_position", self.ground_position, (3,), "m")
         if not isinstance(self.extra, Mapping | None) or not all(
             isinstance(item, Item) for item in (self.extra or {}).values()
         ):

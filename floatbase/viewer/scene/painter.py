@@ -12,12 +12,13 @@ from scipy.spatial.distance import pdist
 from floatbase._validation import Array, as_instance, cached_property
 from floatbase.control import JointLimits
 from floatbase.dynamics import Contacts, FlatFootContact
+from floatbase.dynamics._compiled import connected_frames
 from floatbase.errors import InputError, unknown_name
 from floatbase.robots import Robot, State
 from floatbase.viewer.scene import geometry, markers, shapes, threejs
 from floatbase.viewer.scene.colours import GHOST, RGB
 from floatbase.viewer.scene.cone_picture import ConeShape, cone_picture
-from floatbase.viewer.scene.contact_forces import Forces, as_point_forces
+from floatbase.viewer.scene.contact_forces import Forces, as_forces
 from floatbase.viewer.scene.ground import LEVEL, DrawnGround, blocks, plane_under
 from floatbase.viewer.scene.limit_rings import limit_rings
 from floatbase.viewer.scene.meshes import JointMesh, robot_meshes
@@ -59,29 +60,36 @@ class Painter:
         self._check_state(state)
         if contacts is not None:
             as_instance("contacts", contacts, Contacts)
-        both = Forces(
-            as_point_forces("forces", forces, contacts),
-            as_point_forces("planned", planned, contacts),
+        given = Forces(
+            as_forces("forces", forces, contacts), as_forces("planned", planned, contacts)
         )
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
-        ground = self._ground(contacts, positions)
-        picture = {"ground": ground.lines(self.line_colour, state.com)}
-        picture |= blocks(ground, self.line_colour) | self._robot(state, "robot", self._shapes)
+        moved = np.asarray(chosen.ground_position, dtype=np.float64)
+        com = state.com - moved  # on the ground, which may itself move
+        ground = self._ground(contacts, positions - moved)
+        on_ground = {"ground": ground.lines(self.line_colour, com)}
+        on_ground |= blocks(ground, self.line_colour)
+        picture = self._robot(state, "robot", self._shapes)
+        if contacts is not None and chosen.arrows:
+            picture |= self._connections(state, contacts, given)
         if contacts is not None and contacts.n_points:
             stands = [
                 contact.name not in chosen.swing_feet
                 for contact in contacts.friction_contacts
                 for _ in contact.point_names
             ]
-            picture |= self._contacts(contacts, positions, both, stands, chosen)
+            picture |= self._contacts(
+                contacts, positions, given.at_points(contacts), stands, chosen
+            )
             if chosen.support:
-                region = markers.support_region(positions[stands], 0.004 * self.size, ground)
-                picture |= prefixed("support", region)
+                at = positions[stands] - moved
+                region = markers.support_region(at, 0.004 * self.size, ground)
+                on_ground |= prefixed("support", region)
             if chosen.labels:
                 picture |= self._labels(state, contacts, positions)
         if chosen.com:
-            com = shapes.centre_of_mass(state.com, ground.height(state.com), self.size)
-            picture |= prefixed("com", com)
+            drawn = shapes.centre_of_mass(com, ground.height(com), self.size)
+            on_ground |= prefixed("com", drawn)
         if chosen.joint_limits:
             picture |= self._limit_rings(state, chosen)
         if chosen.wrench is not None:
@@ -98,8 +106,11 @@ class Painter:
             picture |= prefixed(f"frame/{path_part(name)}", axes)
         kinds = {path.split("/")[0] for path in picture}
         if kinds & {"measured", "planned", "cone", "push", "wrench"}:
-            picture |= self._scale_bar(ground)
-        return picture | dict(chosen.extra or {})
+            on_ground |= self._scale_bar(ground)
+        if moved.any():
+            shift = shapes.transform(moved)
+            on_ground = {p: Item(s, shift @ matrix, c) for p, (s, matrix, c) in on_ground.items()}
+        return on_ground | picture | dict(chosen.extra or {})
 
     def replace(self, **changes: Any) -> Painter:
         """Return a painter with other facets or another ground."""
@@ -234,6 +245,20 @@ class Painter:
                     vector, halo = self.scale * vectors[i], kind == "planned"
                     arrow = shapes.arrow(position, vector, colour, self.size, halo)
                     picture[f"{kind}/{at}"] = arrow
+        return picture
+
+    def _connections(self, state: State, contacts: Contacts, given: Forces) -> Picture:
+        """Draw the forces of fixed frames and rigid connections at their first frames."""
+        picture: Picture = {}
+        for contact in contacts:
+            for kind, values, colour in given.kinds if connected_frames(contact) else ():
+                if values is None or values.shape != (contacts.k,):
+                    continue
+                force = values[contacts.force_slice(contact.name)][:3]
+                if not self._is_negligible(force):
+                    start, halo = state.point(connected_frames(contact)[0]), kind == "planned"
+                    arrow = shapes.arrow(start, self.scale * force, colour, self.size, halo)
+                    picture[f"{kind}/{path_part(contact.name)}"] = arrow
         return picture
 
     def _is_negligible(self, force: Array) -> bool:
