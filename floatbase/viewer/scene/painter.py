@@ -66,7 +66,9 @@ class Painter:
         positions = np.zeros((0, 3)) if contacts is None else contacts.positions(state)
         ground = self._ground(contacts, positions)
         picture = {"ground": ground.lines(self.line_colour, state.com)}
-        picture |= blocks(ground, self.line_colour) | self._robot(state, "robot", self._shapes)
+        picture |= blocks(ground, self.line_colour)
+        if chosen.robot:
+            picture |= self._robot(state, "robot", self._shapes)
         if contacts is not None and contacts.n_points:
             stands = [
                 contact.name not in chosen.swing_feet

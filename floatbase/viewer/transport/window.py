@@ -21,6 +21,8 @@ from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.server import Server
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from floatbase.viewer.transport.notebook_widget import NotebookWidget
 
 ADDRESS = "127.0.0.1"
@@ -75,6 +77,13 @@ class Window:
         self._newest_display = weakref.ref(made)
         return made
 
+    def draw_into(self, visualizer: Visualizer) -> None:
+        """Draw into a stock meshcat server too."""
+        # loads pyzmq, which no other window needs
+        from floatbase.viewer.transport.mirror import MeshcatMirror
+
+        MeshcatMirror(self._server, visualizer)
+
     @property
     def n_pages(self) -> int:
         """Number of connected pages."""
@@ -112,6 +121,11 @@ class Window:
         """Raise `ViewerError` if the window is closed."""
         if not self._finalizer.alive:
             raise ViewerError(f"The viewer's window is closed, so {lost}. Open a new one.")
+        if self._server.failure:
+            raise ViewerError(
+                f"{self._server.failure}, so {lost}. Make a new meshcat.Visualizer, and a new "
+                f"Viewer for it."
+            )
 
 
 def _checked_port(port: int) -> int:

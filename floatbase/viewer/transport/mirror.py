@@ -1,0 +1,127 @@
+"""The page of a stock meshcat server, which shows the same picture as a window.
+
+The server draws for other programs too, so everything lies below a path of this window.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import msgpack
+import zmq
+import zmq.asyncio
+
+from floatbase.viewer.scene import protocol
+from floatbase.viewer.scene.diff import ROOT
+from floatbase.viewer.transport.connection import Channel, Connection
+
+if TYPE_CHECKING:
+    from meshcat import Visualizer
+
+    from floatbase.viewer.transport.server import Server
+
+_OURS = protocol.normal_path(ROOT)  # where the scene is in our own pages
+_DRAWN = "set_object", "set_transform", "set_property", "delete"
+_FINISHING_TIME = 2.0  # s in which the server must have answered when the window closes
+
+
+class MeshcatMirror(Channel):
+    """A channel to the server of a `meshcat.Visualizer`."""
+
+    min_interval = 1.0 / 30.0  # s; meshcat's page starves if it receives more pictures
+
+    def __init__(self, server: Server, visualizer: Visualizer):
+        self._server, self._url = server, visualizer.window.zmq_url
+        self._root = protocol.normal_path(f"{visualizer.path.lower()}/floatbase")
+        self._objects: dict[str, list[bytes]] = {}
+        server.call(self._connect)
+
+    @property
+    def answers_since(self) -> float:
+        """The present: the server does not answer while `Visualizer.wait` waits for a browser."""
+        return time.monotonic()
+
+    def send_frame(self, number: int, data: bytes) -> None:
+        """Send a frame; the next one may follow when the server has answered."""
+        self._sending = asyncio.ensure_future(self._send(self._messages(data)))
+
+    async def deliver_rest(self) -> None:
+        """Send the last picture."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_FINISHING_TIME):
+                await self._sending
+                await asyncio.sleep(self.min_interval)
+                self._page.next_frame()
+                await self._sending
+
+    def close_page(self, reason: str) -> None:
+        """Disconnect from the server, which keeps the picture."""
+        self._page.close()
+        self._sending.cancel()
+        self._socket.close(linger=0)
+
+    def _connect(self) -> None:
+        """Connect to the server with a socket of our own, which no interrupt can break."""
+        self._socket = zmq.asyncio.Context.instance().socket(zmq.DEALER)
+        self._socket.set_hwm(0)  # unlimited, because the server drops answers that nobody reads
+        ends = zmq.EVENT_DISCONNECTED | zmq.EVENT_CONNECT_RETRIED
+        monitor = self._socket.get_monitor_socket(ends)
+        self._socket.connect(self._url)
+        self._watching = asyncio.ensure_future(self._watch(monitor))
+        self._page = Connection(self._server, self)
+        self._sending = asyncio.ensure_future(self._send([_message("delete", self._root)]))
+        self._server.flush()
+
+    async def _watch(self, monitor: zmq.asyncio.Socket) -> None:
+        """Report the end of the server to the program that draws."""
+        with monitor:
+            await monitor.recv_multipart()
+        self._server.failure = f"The meshcat server at {self._url} does not run any more"
+        self.close_page(self._server.failure)
+
+    async def _send(self, messages: Iterable[list[bytes]]) -> None:
+        """Send messages, and wait until the server has answered all."""
+        sent = [await self._socket.send_multipart([b"", *message]) for message in messages]
+        for _ in sent:
+            await self._socket.recv_multipart()
+        self._page.receive('{"type": "done"}')
+
+    def _messages(self, frame: bytes) -> Iterator[list[bytes]]:
+        """Yield the commands of a frame that the server understands, with their paths there."""
+        for command in map(msgpack.unpackb, protocol.unframe(frame)):
+            kind, path = command.pop("type"), protocol.normal_path(command.pop("path", ""))
+            if kind == "set_animation":
+                for animation in command["animations"]:
+                    animation["path"] = self._path(animation["path"])
+                    animation["clip"]["fps"] = command["options"]["speed"]
+                path = f"{self._root}/animation"
+                # pages that open later receive the newest path last, after all that it animates
+                yield _message("delete", path)
+                yield _message(kind, path, **command)
+            elif kind in _DRAWN and f"{path}/".startswith(ROOT):
+                path = self._path(path)
+                message = _message(kind, path, **command)
+                if kind == "set_object":
+                    self._objects[path] = message
+                elif kind == "set_property" and path in self._objects:
+                    # the server keeps all properties that an object has had; only the object itself
+                    # clears them, and an equal object is not sent to the pages again
+                    yield self._objects[path]
+                elif kind == "delete":
+                    kept = self._objects.items()
+                    self._objects = {p: m for p, m in kept if not f"{p}/".startswith(f"{path}/")}
+                yield message
+
+    def _path(self, path: str) -> str:
+        """Return the server's path for one of our own pages."""
+        return self._root + protocol.normal_path(path).removeprefix(_OURS)
+
+
+def _message(kind: str, path: str, **values: object) -> list[bytes]:
+    """Encode a command as the server expects it."""
+    command = {"type": kind, "path": path, **values}
+    return [kind.encode(), path.encode(), msgpack.packb(command, use_single_float=True)]
