@@ -195,7 +195,7 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         **options
-            What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
+            What to draw: robot, com, cones, arrows, support, wrench, push, ghost, frames, labels,
             extra, swing_feet, joint_limits, qdd. `PictureOptions` describes them.
 
         Returns

@@ -9,7 +9,7 @@ import asyncio
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgpack
 import zmq
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from floatbase.viewer.transport.server import Server
 
-_OURS = protocol.normal_path(ROOT)  # where the scene is in our own pages
 _DRAWN = "set_object", "set_transform", "set_property", "delete"
 _FINISHING_TIME = 2.0  # s in which the server must have answered when the window closes
 
@@ -36,8 +35,7 @@ class MeshcatMirror(Channel):
 
     def __init__(self, server: Server, visualizer: Visualizer):
         self._server, self._url = server, visualizer.window.zmq_url
-        self._root = protocol.normal_path(f"{visualizer.path.lower()}/floatbase")
-        self._objects: dict[str, list[bytes]] = {}
+        self._root = f"{visualizer.path.lower()}/floatbase"
         server.call(self._connect)
 
     @property
@@ -73,7 +71,8 @@ class MeshcatMirror(Channel):
         self._socket.connect(self._url)
         self._watching = asyncio.ensure_future(self._watch(monitor))
         self._page = Connection(self._server, self)
-        self._sending = asyncio.ensure_future(self._send([_message("delete", self._root)]))
+        old = {"type": "delete", "path": ROOT}
+        self._sending = asyncio.ensure_future(self._send([self._message(old)]))
         self._server.flush()
 
     async def _watch(self, monitor: zmq.asyncio.Socket) -> None:
@@ -91,37 +90,30 @@ class MeshcatMirror(Channel):
         self._page.receive('{"type": "done"}')
 
     def _messages(self, frame: bytes) -> Iterator[list[bytes]]:
-        """Yield the commands of a frame that the server understands, with their paths there."""
+        """Yield the commands of a frame that the server understands."""
         for command in map(msgpack.unpackb, protocol.unframe(frame)):
-            kind, path = command.pop("type"), protocol.normal_path(command.pop("path", ""))
+            kind, path = command["type"], command.get("path", "")
             if kind == "set_animation":
                 for animation in command["animations"]:
                     animation["path"] = self._path(animation["path"])
                     animation["clip"]["fps"] = command["options"]["speed"]
-                path = f"{self._root}/animation"
                 # pages that open later receive the newest path last, after all that it animates
-                yield _message("delete", path)
-                yield _message(kind, path, **command)
-            elif kind in _DRAWN and f"{path}/".startswith(ROOT):
-                path = self._path(path)
-                message = _message(kind, path, **command)
-                if kind == "set_object":
-                    self._objects[path] = message
-                elif kind == "set_property" and path in self._objects:
-                    # the server keeps all properties that an object has had; only the object itself
-                    # clears them, and an equal object is not sent to the pages again
-                    yield self._objects[path]
-                elif kind == "delete":
-                    kept = self._objects.items()
-                    self._objects = {p: m for p, m in kept if not f"{p}/".startswith(f"{path}/")}
-                yield message
+                yield self._message({"type": "delete", "path": "<animation>"})
+                yield self._message(command | {"path": "<animation>"})
+            elif kind in _DRAWN and path.startswith(ROOT):
+                shape = (path, "set_object", "")
+                if kind == "set_property" and (made := self._server.scene.command(shape)):
+                    # the server keeps all properties that an object has had; only the object clears
+                    # them, and the server sends no page an object that it has already
+                    yield self._message(made)
+                yield self._message(command)
+
+    def _message(self, command: dict[str, Any]) -> list[bytes]:
+        """Encode a command as the server expects it."""
+        kind, path = command["type"], self._path(command["path"])
+        data = msgpack.packb(command | {"path": path}, use_single_float=True)
+        return [kind.encode(), path.encode(), data]
 
     def _path(self, path: str) -> str:
         """Return the server's path for one of our own pages."""
-        return self._root + protocol.normal_path(path).removeprefix(_OURS)
-
-
-def _message(kind: str, path: str, **values: object) -> list[bytes]:
-    """Encode a command as the server expects it."""
-    command = {"type": kind, "path": path, **values}
-    return [kind.encode(), path.encode(), msgpack.packb(command, use_single_float=True)]
+        return protocol.normal_path(f"{self._root}/{path.removeprefix(ROOT)}")
