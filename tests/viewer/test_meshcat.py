@@ -106,8 +106,13 @@ def test_a_run_plays_at_its_speed_until_the_next_picture(view, vis, go2, standin
     controller = fb.WholeBodyController(go2, contacts, fb.standing_tasks(standing))
     push = fb.Push([0.0, 60.0, 0.0], start=0.05, duration=0.1)
     run = fb.rollout(fb.Simulation(go2), controller, 0.2, pushes=[push])
-    view.play(run, speed=0.5)
+    ball = fb.viewer.shapes.centre_of_mass([0.0, 0.0, 0.0], 0.0, 1.0)["/ball"]
+    view.play_pictures([0.0, 1.0], [{"ball": ball}, {}])
     until(lambda: stored(vis, "set_animation"))
+    view.play(run, speed=0.5)
+    until(
+        lambda: "/push" in matrices(vis) and len(stored(vis, "set_animation")[0]["animations"]) > 1
+    )
     (animation,) = stored(vis, "set_animation", "")
     paths = {clip["path"].removeprefix(ROOT) for clip in animation["animations"]}
     assert {"/robot/root_joint", "/push"} <= paths <= matrices(vis).keys()
