@@ -30,7 +30,7 @@ from floatbase.viewer.export import recording
 from floatbase.viewer.output import Output
 from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
-from floatbase.viewer.scene.diff import ROOT, DiffRenderer
+from floatbase.viewer.scene.diff import DiffRenderer
 from floatbase.viewer.scene.ground import MIN_VERTICAL, DrawnGround, Plane, Planes, Terrain
 from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter
@@ -493,7 +493,9 @@ class Viewer(Controls, Output):
             This viewer.
         """
         _check_texts(title=title, ghost_name=ghost_name)
-        moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
+        moving = recording.animate(
+            times, pictures, protocol.ROOT, as_positive("speed", speed), paused
+        )
         self.draw(moving.first, title)
         kinds = set[str]().union(*map(legend.kinds, pictures))
         self.renderer.set(*self._caption(kinds, title, ghost_name))

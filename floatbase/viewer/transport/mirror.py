@@ -16,7 +16,6 @@ import zmq
 import zmq.asyncio
 
 from floatbase.viewer.scene import protocol
-from floatbase.viewer.scene.diff import ROOT
 from floatbase.viewer.transport.connection import Channel, Connection
 
 if TYPE_CHECKING:
@@ -71,7 +70,7 @@ class MeshcatMirror(Channel):
         self._socket.connect(self._url)
         self._watching = asyncio.ensure_future(self._watch(monitor))
         self._page = Connection(self._server, self)
-        old = {"type": "delete", "path": ROOT}
+        old = {"type": "delete", "path": protocol.ROOT}
         self._sending = asyncio.ensure_future(self._send([self._message(old)]))
         self._server.flush()
 
@@ -100,7 +99,7 @@ class MeshcatMirror(Channel):
                 # pages that open later receive the newest path last, after all that it animates
                 yield self._message({"type": "delete", "path": "<animation>"})
                 yield self._message(command | {"path": "<animation>"})
-            elif kind in _DRAWN and path.startswith(ROOT):
+            elif kind in _DRAWN and path.startswith(protocol.ROOT):
                 shape = (path, "set_object", "")
                 if kind == "set_property" and (made := self._server.scene.command(shape)):
                     # the server keeps all properties that an object has had; only the object clears
@@ -116,4 +115,4 @@ class MeshcatMirror(Channel):
 
     def _path(self, path: str) -> str:
         """Return the server's path for one of our own pages."""
-        return protocol.normal_path(f"{self._root}/{path.removeprefix(ROOT)}")
+        return protocol.normal_path(f"{self._root}/{path.removeprefix(protocol.ROOT)}")
