@@ -15,7 +15,7 @@ import tornado.netutil
 
 from floatbase._locks import InterruptibleLock
 from floatbase._validation import short_repr
-from floatbase.errors import ViewerError
+from floatbase.errors import MissingDependencyError, ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.server import Server
@@ -66,7 +66,7 @@ class Window:
         try:  # loads ipywidgets, which no script needs
             from floatbase.viewer.transport.notebook_widget import NotebookWidget
         except ImportError as error:
-            raise ViewerError(
+            raise MissingDependencyError(
                 f"A viewer in a notebook needs the package {error.name}, which is not installed. "
                 'Install it with pip install "floatbase[viewer]". The page at `url` does not need '
                 "it."
