@@ -13,8 +13,8 @@ from floatbase.__main__ import main
 
 # what the base install lacks
 EXTRAS = (
-    "anywidget", "cvxpy", "ipywidgets", "IPython", "jupyterlab", "matplotlib", "msgpack",
-    "nbclient", "nbformat", "pandas", "PIL", "sphinx", "tornado", "traitlets",
+    "anywidget", "cvxpy", "ipywidgets", "IPython", "jupyterlab", "matplotlib", "meshcat",
+    "msgpack", "nbclient", "nbformat", "pandas", "PIL", "sphinx", "tornado", "traitlets", "zmq",
 )  # fmt: skip
 BASE_INSTALL = f"""
 import sys

@@ -24,6 +24,9 @@ def test_the_code_of_a_page_prints_the_output_of_the_page(page, tmp_path, monkey
     for name in ("view", "page"):
         if name in names:
             names[name].close()
+    if "viz" in names:  # meshcat ends its server when Python ends
+        names["viz"].viewer.window.server_proc.kill()
+        names["viz"].viewer.window.server_proc.wait()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

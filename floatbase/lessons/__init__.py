@@ -4,7 +4,7 @@ import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from floatbase.errors import FloatbaseError, explain_arguments
+from floatbase.errors import MissingDependencyError, explain_arguments
 from floatbase.lessons import progress
 from floatbase.lessons.controllers import ConstantTorques, TorqueCommand, joint_servo
 from floatbase.lessons.exercises import all_exercises, check, own_numbers, reveal, show_progress
@@ -81,7 +81,7 @@ def __getattr__(name: str) -> Any:
     except ModuleNotFoundError as error:
         if str(error.name).startswith("floatbase"):
             raise
-        raise FloatbaseError(
+        raise MissingDependencyError(
             f"The course needs {error.name}, which is not installed. Install it with "
             'pip install "floatbase[course]".'
         ) from None

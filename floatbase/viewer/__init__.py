@@ -6,7 +6,7 @@ from. `shapes` and `markers` make additional items for a picture, in the `colour
 recovery.
 """
 
-from floatbase.errors import ViewerError, explain_arguments
+from floatbase.errors import MissingDependencyError, explain_arguments
 
 try:
     from floatbase.viewer import plots
@@ -19,7 +19,7 @@ try:
 except ModuleNotFoundError as error:
     if str(error.name).startswith("floatbase"):
         raise
-    raise ViewerError(
+    raise MissingDependencyError(
         f"The viewer needs {error.name}, which is not installed. Install it with "
         'pip install "floatbase[viewer]".'
     ) from None

@@ -20,7 +20,6 @@ from floatbase._validation import (
 from floatbase.errors import InputError
 from floatbase.robots import Robot, State
 from floatbase.viewer.scene import protocol
-from floatbase.viewer.scene.diff import ROOT
 from floatbase.viewer.scene.ground import displacement
 from floatbase.viewer.scene.painter import Painter
 
@@ -135,7 +134,7 @@ class FollowingCamera:
         base = f"{ROBOT}/{self.robot.model.names[1]}" if followed == ROBOT else followed
         follows = self.follows and self.robot.is_floating
         start = (self._state or painter.standing).joint_transforms[1][:3, 3]
-        node, moved = ROOT + base if follows else "", self._displacement(painter)
+        node, moved = protocol.ROOT + base if follows else "", self._displacement(painter)
         return protocol.set_follow(node, start, moved, smooth=followed == ROBOT)
 
     def _placement(self, painter: Painter, view: View) -> tuple[Array, Array, float]:

@@ -20,7 +20,7 @@ from floatbase._validation import (
 )
 from floatbase.behaviours import StepPlan, Walk
 from floatbase.dynamics import Contacts
-from floatbase.errors import InputError
+from floatbase.errors import InputError, require
 from floatbase.friction import FrictionPolyhedron
 from floatbase.qp import Solution
 from floatbase.robots import Robot, State
@@ -30,7 +30,7 @@ from floatbase.viewer.export import recording
 from floatbase.viewer.output import Output
 from floatbase.viewer.scene import gait_overlay, legend, markers, protocol, shapes
 from floatbase.viewer.scene.colours import BACKGROUNDS, GHOST_NAME, RGB
-from floatbase.viewer.scene.diff import ROOT, DiffRenderer
+from floatbase.viewer.scene.diff import DiffRenderer
 from floatbase.viewer.scene.ground import MIN_VERTICAL, DrawnGround, Plane, Planes, Terrain
 from floatbase.viewer.scene.options import PictureKeywords
 from floatbase.viewer.scene.painter import Painter
@@ -38,6 +38,8 @@ from floatbase.viewer.scene.shapes import Picture, prefixed
 from floatbase.viewer.transport.window import Window
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from floatbase.simulation import Ground, Rollout
 
 UP = (0.0, 0.0, 1.0)
@@ -78,6 +80,9 @@ class Viewer(Controls, Output):
     port : int, optional
         Port of the page; 0 takes a free port when `url` is first read, so a viewer that is only
         displayed in a notebook opens no port.
+    meshcat : meshcat.Visualizer, optional
+        A visualizer in which to draw too, below its path `floatbase`. Everything else in it stays
+        as it is. Pinocchio's `MeshcatVisualizer` has one: its attribute `viewer`.
 
     Raises
     ------
@@ -100,6 +105,7 @@ class Viewer(Controls, Output):
         ground: Ground | npt.ArrayLike | None = None,
         follow: bool = False,
         port: int = 0,
+        meshcat: Visualizer | None = None,
     ):
         as_instance("robot", robot, Robot)
         if not isinstance(background, str) or background not in BACKGROUNDS:
@@ -112,6 +118,9 @@ class Viewer(Controls, Output):
             np.array(UP), 1.0, 4 if facets is None else facets, inner_approximation, facet_rotation
         )
         self.robot, self.background = robot, background
+        if meshcat is not None:
+            kind = require("meshcat", "viewer").Visualizer
+            as_instance("meshcat", meshcat, kind, "`viewer` of Pinocchio's MeshcatVisualizer")
         self.height = as_integer("height", height, 1, _MAX_HEIGHT, "in pixels")
         requested = None if scale is None else as_positive("scale", scale, "m/N")
         background_colour, _, line_colour, text_colour = BACKGROUNDS[background]
@@ -129,6 +138,8 @@ class Viewer(Controls, Output):
         self._legend_entries: dict[str, tuple[RGB, str]] = {}
         super().__init__()
         self._set_stage(background)
+        if meshcat is not None:
+            self.window.draw_into(meshcat)
 
     @property
     def url(self) -> str:
@@ -185,7 +196,7 @@ class Viewer(Controls, Output):
         ghost_name : str, optional
             Name of the ghost in the legend.
         **options
-            What else to draw: com, cones, arrows, support, wrench, push, ghost, frames, labels,
+            What to draw: robot, com, cones, arrows, support, wrench, push, ghost, frames, labels,
             extra, swing_feet, joint_limits, qdd, ground_position. `PictureOptions` describes them.
 
         Returns
@@ -487,7 +498,9 @@ class Viewer(Controls, Output):
             This viewer.
         """
         _check_texts(title=title, ghost_name=ghost_name)
-        moving = recording.animate(times, pictures, ROOT, as_positive("speed", speed), paused)
+        moving = recording.animate(
+            times, pictures, protocol.ROOT, as_positive("speed", speed), paused
+        )
         self.draw(moving.first, title)
         kinds = set[str]().union(*map(legend.kinds, pictures))
         self.renderer.set(*self._caption(kinds, title, ghost_name))

@@ -14,7 +14,7 @@ from PIL import Image
 
 import floatbase as fb
 from floatbase.control import JointLimits
-from floatbase.errors import InputError, ViewerError
+from floatbase.errors import InputError, MissingDependencyError, ViewerError
 from floatbase.lessons import ConstantTorques
 from floatbase.simulation import Push
 
@@ -82,7 +82,7 @@ def test_the_errors_of_a_film_name_what_it_needs(view, tmp_path, monkeypatch):
         with raises(InputError, "size", *size, 100, 4000):
             view.save(tmp_path / "push.mp4", size=size)
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
-    with raises(ViewerError, "playwright", "floatbase[video]"):
+    with raises(MissingDependencyError, "playwright", "floatbase[video]"):
         view.save(tmp_path / "push.png", size=SIZE)
 
 

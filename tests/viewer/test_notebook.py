@@ -16,7 +16,7 @@ from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook
 from waiting import until
 
-from floatbase.errors import ViewerError
+from floatbase.errors import MissingDependencyError
 from floatbase.viewer import Viewer
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.transport.window import Window
@@ -184,7 +184,7 @@ def test_a_newer_display_retires_the_one_before_which_shows_its_image(window):
 def test_a_display_without_its_package_names_the_extra(window, monkeypatch):
     monkeypatch.setitem(sys.modules, "anywidget", None)
     monkeypatch.delitem(sys.modules, "floatbase.viewer.transport.notebook_widget")
-    with raises(ViewerError, "anywidget", "floatbase[viewer]"):
+    with raises(MissingDependencyError, "anywidget", "floatbase[viewer]"):
         window.widget("a", 100)
 
 

@@ -18,7 +18,7 @@ from tqdm.auto import tqdm
 from floatbase._browser import browser_path
 from floatbase._files import whole_file
 from floatbase._validation import as_array, short_repr
-from floatbase.errors import InputError, ViewerError
+from floatbase.errors import InputError, MissingDependencyError, ViewerError
 from floatbase.viewer.scene.colours import LEGEND
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Generator[Image, Non
         from PIL import Image
         from playwright.sync_api import Error, sync_playwright
     except ImportError as error:
-        raise ViewerError(
+        raise MissingDependencyError(
             f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     path = browser_path()
@@ -153,7 +153,7 @@ def _write_mp4(target: Path, pictures: Iterator[Image], size: tuple[int, int]) -
     try:
         import av
     except ImportError as error:
-        raise ViewerError(
+        raise MissingDependencyError(
             f"No image or film can be made: {error.name} is not installed. {_REQUIREMENTS}"
         ) from None
     with av.open(str(target), "w", format="mp4", options={"movflags": "faststart"}) as film:

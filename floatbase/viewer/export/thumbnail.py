@@ -17,9 +17,9 @@ from PIL import Image, ImageDraw
 from floatbase._validation import Array
 from floatbase.viewer.export.rasteriser import NEAR_PLANE, Camera, Pixels, draw_meshes, unpacked
 from floatbase.viewer.scene.colours import BACKGROUNDS, RGB, hex_code
-from floatbase.viewer.scene.diff import ROOT
 from floatbase.viewer.scene.ground import LEVEL, DrawnGround, Plane, Planes, Terrain, displacement
 from floatbase.viewer.scene.label_image import FONT_SIZE, font
+from floatbase.viewer.scene.protocol import ROOT
 from floatbase.viewer.scene.shapes import Item, Picture
 from floatbase.viewer.scene.store import Scene
 

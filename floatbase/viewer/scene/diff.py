@@ -6,8 +6,6 @@ from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.shapes import Item, Picture, with_normal_paths
 from floatbase.viewer.transport.window import Window
 
-ROOT = "/meshcat/"
-
 
 class DiffRenderer:
     """Draws whole pictures into a window by sending only what changes."""
@@ -21,16 +19,16 @@ class DiffRenderer:
     def draw(self, picture: Picture, *settings: protocol.Update) -> int:
         """Show this picture and nothing else."""
         picture = with_normal_paths(picture)
-        updates = [protocol.delete(ROOT)] if self._interrupted else []
+        updates = [protocol.delete(protocol.ROOT)] if self._interrupted else []
         old: Picture = {} if self._interrupted else self.picture
         removed_paths = [
             path for path, item in old.items() if not _can_become(item, picture.get(path))
         ]
-        updates += [protocol.delete(ROOT + path) for path in removed_paths]
+        updates += [protocol.delete(protocol.ROOT + path) for path in removed_paths]
         deleted = tuple(f"{path}/" for path in removed_paths)
         for path, item in picture.items():
             before = None if f"{path}/".startswith(deleted) else old.get(path)
-            updates += _changes(ROOT + path, before, item)
+            updates += _changes(protocol.ROOT + path, before, item)
         new_settings = self._unsent(settings)
         updates += new_settings
         if updates:

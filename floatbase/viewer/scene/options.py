@@ -18,6 +18,7 @@ from floatbase.viewer.scene.shapes import Item
 class PictureKeywords(TypedDict, total=False):
     """Fields of `PictureOptions` as keyword arguments."""
 
+    robot: bool
     com: bool
     cones: bool
     arrows: bool
@@ -40,6 +41,8 @@ class PictureOptions:
 
     Parameters
     ----------
+    robot : bool
+        Whether to draw the robot itself, which another visualizer may draw already.
     com : bool
         Whether to draw the centre of mass and its projection on the ground.
     cones : bool
@@ -82,6 +85,7 @@ class PictureOptions:
         If a value has the wrong type or contains NaN.
     """
 
+    robot: bool = True
     com: bool = True
     cones: bool = True
     arrows: bool = True
@@ -98,7 +102,7 @@ class PictureOptions:
     ground_position: npt.ArrayLike = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("com", "cones", "arrows", "support", "labels"):
+        for name in ("robot", "com", "cones", "arrows", "support", "labels"):
             as_bool(name, getattr(self, name))
         if self.wrench is not None:
             as_array("wrench", self.wrench, (6,), "N and N·m")

@@ -69,7 +69,7 @@ class Painter:
         ground = self._ground(contacts, positions - moved)
         on_ground = {"ground": ground.lines(self.line_colour, com)}
         on_ground |= blocks(ground, self.line_colour)
-        picture = self._robot(state, "robot", self._shapes)
+        picture = self._robot(state, "robot", self._shapes) if chosen.robot else {}
         if contacts is not None and chosen.arrows:
             picture |= self._connections(state, contacts, given)
         if contacts is not None and contacts.n_points:

@@ -30,6 +30,7 @@ TYPES = (
     "set_text", "add_plot_point", "set_views", "set_disconnect_message", "set_ground",
 )  # fmt: skip
 
+ROOT = "/meshcat/"  # path of all that a picture shows
 ANIMATION: Key = ("/", "set_animation", "")
 _MAX_CONTROL_VALUE = 1e18  # of a slider: MessagePack's integers end at 1.8e19
 # MessagePack: the byte 0xca, then a big-endian float

@@ -53,6 +53,9 @@ class Channel:
         """Send a frame."""
         raise NotImplementedError
 
+    async def deliver_rest(self) -> None:
+        """Deliver what must not be lost when the window closes."""
+
     def close_page(self, reason: str) -> None:
         """Disconnect the page. The page may connect again as a new one."""
         raise NotImplementedError

@@ -30,6 +30,7 @@ class Server:
     def __init__(self, scene: Scene):
         self.scene = scene
         self.port: int | None = None
+        self.failure = ""  # why the window cannot draw any more
         self.cells = CellEvents()
         self.clients: list[Connection] = []
         self.on_control: Callable[[str, Any], None] | None = None
@@ -102,6 +103,7 @@ class Server:
             if stop_callback is not None:
                 stop_callback()
         for client in list(self.clients):
+            await client.channel.deliver_rest()
             client.channel.close_page("the window was closed")
         if self._http is not None:
             await self._http.close_all_connections()

@@ -15,12 +15,14 @@ import tornado.netutil
 
 from floatbase._locks import InterruptibleLock
 from floatbase._validation import short_repr
-from floatbase.errors import ViewerError
+from floatbase.errors import MissingDependencyError, ViewerError
 from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.store import Scene
 from floatbase.viewer.transport.server import Server
 
 if TYPE_CHECKING:
+    from meshcat import Visualizer
+
     from floatbase.viewer.transport.notebook_widget import NotebookWidget
 
 ADDRESS = "127.0.0.1"
@@ -64,7 +66,7 @@ class Window:
         try:  # loads ipywidgets, which no script needs
             from floatbase.viewer.transport.notebook_widget import NotebookWidget
         except ImportError as error:
-            raise ViewerError(
+            raise MissingDependencyError(
                 f"A viewer in a notebook needs the package {error.name}, which is not installed. "
                 'Install it with pip install "floatbase[viewer]". The page at `url` does not need '
                 "it."
@@ -74,6 +76,13 @@ class Window:
         made = NotebookWidget(self._server, name, height, thumbnail)
         self._newest_display = weakref.ref(made)
         return made
+
+    def draw_into(self, visualizer: Visualizer) -> None:
+        """Draw into a stock meshcat server too."""
+        # loads pyzmq, which no other window needs
+        from floatbase.viewer.transport.mirror import MeshcatMirror
+
+        MeshcatMirror(self._server, visualizer)
 
     @property
     def n_pages(self) -> int:
@@ -112,6 +121,11 @@ class Window:
         """Raise `ViewerError` if the window is closed."""
         if not self._finalizer.alive:
             raise ViewerError(f"The viewer's window is closed, so {lost}. Open a new one.")
+        if self._server.failure:
+            raise ViewerError(
+                f"{self._server.failure}, so {lost}. Make a new meshcat.Visualizer, and a new "
+                f"Viewer for it."
+            )
 
 
 def _checked_port(port: int) -> int:

@@ -11,7 +11,7 @@ const rules = {
 };
 
 export default [
-  {ignores: ["dist/", "vendor/"]},
+  {ignores: ["dist/"]},
   {linterOptions: {reportUnusedDisableDirectives: "error"}},
   {files: ["src/**/*.js"], languageOptions: {globals: globals.browser}, rules},
   {files: ["*.mjs", "*.js", "test/**/*.js"], languageOptions: {globals: globals.node}, rules},

@@ -15,6 +15,7 @@ import json
 import re
 from collections.abc import Iterable
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,16 @@ from floatbase.viewer.scene import protocol
 from floatbase.viewer.scene.colours import BACKGROUNDS, DARK_SHADES, hex_code
 
 DIST = Path(__file__).with_name("dist")
+_MESHCAT = find_spec("meshcat")  # not imported, because it imports IPython
+if _MESHCAT is None or _MESHCAT.origin is None:
+    raise ModuleNotFoundError("No module named 'meshcat'", name="meshcat")
+_VIEWER_CODE = Path(_MESHCAT.origin).with_name("viewer") / "dist" / "main.min.js"
 
 
 @cache
 def viewer_code() -> bytes:
-    """Return meshcat's viewer, one JavaScript file; vendor/README.md documents its origin."""
-    return Path(__file__).with_name("vendor").joinpath("meshcat.min.js").read_bytes()
+    """Return meshcat's viewer, one JavaScript file of the installed package."""
+    return _VIEWER_CODE.read_bytes()
 
 
 @cache
