@@ -139,7 +139,7 @@ def anchor(number):
     return f"app-{number[-1].lower()}" if number.startswith("App") else f"eq-{number.strip('()')}"
 
 
-# controls that a screen reader cannot name by what they show, and lists of definitions without terms
+# controls that a screen reader cannot name by what they show, and definitions without terms
 UNNAMED = """() => [...document.querySelectorAll("summary, button")].some((control) => {
   const label = control.ariaLabel ?? control.title, words = control.innerText.trim();
   return !(label || control.textContent.trim()) || (control.ariaLabel && !label.includes(words));
