@@ -14,6 +14,8 @@ from typing import Any
 
 from browsers import SCREENSHOTS
 
+from floatbase.lessons.lab import SETTINGS
+
 IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
 WINDOW: dict[str, Any] = {
     "viewport": {"width": 1100, "height": 800},
@@ -76,6 +78,7 @@ DRAWN = "() => window.viewer?.num_messages_received > 0"
 def server(command: list[str], home: Path) -> Iterator[tuple[subprocess.Popen[bytes], Path]]:
     """A program of Jupyter that serves from this home, and its log."""
     own = dict.fromkeys(("JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "HOME"), str(home))
+    own["JUPYTER_CONFIG_PATH"] = str(SETTINGS)
     log = home / "server.log"
     with log.open("w") as sink:
         started = subprocess.Popen(

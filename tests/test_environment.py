@@ -33,8 +33,12 @@ def test_the_wheel_brings_the_meshes_their_licences_and_the_built_pages(tmp_path
     built = {path.relative_to(ROOT).as_posix() for path in (web / "dist").iterdir()}
     assert built <= packed
     assert not [name for name in packed if "web/src/" in name or "node_modules" in name]
-    expected = {"floatbase", wheel.name.rsplit("-", 3)[0] + ".dist-info"}
-    assert {name.split("/")[0] for name in packed} == expected
+    name = wheel.name.rsplit("-", 3)[0]
+    assert {name.split("/")[0] for name in packed} == {
+        "floatbase", f"{name}.dist-info", f"{name}.data"
+    }  # fmt: skip
+    extension = f"{name}.data/data/share/jupyter/labextensions/floatbase/package.json"
+    assert extension in packed  # where JupyterLab finds it
     run_lesson_of_wheel("02_equations_of_motion.ipynb", wheel, tmp_path)
 
 

@@ -1,5 +1,5 @@
-"""JupyterLab in a real browser: two lessons run without an error, and each of their pictures
-answers to its sliders.
+"""JupyterLab in a real browser: two lessons run without an error, each of their pictures answers to
+its sliders, and reopened without a kernel each is an image.
 
 The browser reaches JupyterLab's own address and nothing else, as that of a reader whose kernel is
 on another machine. What JupyterLab saves of a lesson that was only run and looked at does not count
@@ -80,7 +80,6 @@ def lab(course, tmp_path_factory):
         place.write_text(json.dumps(setting))
     options = ["--no-browser", "--ip=127.0.0.1", "--port=0", "--allow-root"]
     options += ["--IdentityProvider.token=a-test", "--LabApp.expose_app_in_browser=True"]
-    options += ["--LabApp.news_url=None"]
     with server(["jupyterlab", *options, str(course)], home) as (_, log):
         yield address_in(log)
 
@@ -106,12 +105,31 @@ def test_a_lesson_runs_its_pictures_answer_to_their_sliders_and_nothing_of_it_co
             is_heard_while_the_kernel_works(page, push_panel_of(page))
         assert strangers == []
         page.evaluate(SAVE)
+        _shows_images_when_reopened(page, lab, course / MY_FOLDER / f"{name}.ipynb")
         _change(course / f"{name}.ipynb")
         assert prepare_workspace(course) == [f"{name}.ipynb: updated"]
     finally:
         screenshot(page, f"{name.split('_')[0]}_end")
         page.evaluate("() => window.jupyterapp?.serviceManager.sessions.shutdownAll()")
         page.close()
+
+
+def _shows_images_when_reopened(page, lab, lesson):
+    """Open the pictures of a saved lesson with a new kernel, which does not know its widgets."""
+    notebook = nbformat.read(lesson, as_version=4)
+    notebook.metadata.pop("widgets")  # as JupyterLab saves by default
+    notebook.cells = [cell for cell in notebook.cells if "widget-view" in str(cell.get("outputs"))]
+    for cell in notebook.cells:
+        cell.metadata.clear()  # its output is hidden, see LOOKS
+    nbformat.write(notebook, lesson.with_name("reopened.ipynb"))
+    assert notebook.cells
+    page.goto(f"{lab}/lab/workspaces/reopened/tree/{MY_FOLDER}/reopened.ipynb?token=a-test")
+    lesson_opened(page)
+    for number in range(len(notebook.cells)):
+        page.evaluate(f"(number) => {NOTEBOOK}.content.scrollToItem(number)", number)
+        image = page.locator(".jp-Notebook .jp-Cell").nth(number).locator(".jp-OutputArea img")
+        image.first.wait_for()
+    assert "Error displaying widget" not in page.locator(".jp-Notebook").inner_text()
 
 
 def _change(lesson):

@@ -129,21 +129,36 @@ def test_equations_and_functions_lead_to_each_other(built):
     assert {anchor(number) for number in equations.TITLES} <= map_page.names
 
 
+def test_no_page_tells_its_reader_that_it_is_generated(built):
+    for path in pages(built):
+        shown = re.sub("<!--.*?-->", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+        assert "lessons.publish map" not in shown or path.name == "contributing.html", path
+
+
 def anchor(number):
     return f"app-{number[-1].lower()}" if number.startswith("App") else f"eq-{number.strip('()')}"
+
+
+# controls that a screen reader cannot name by what they show, and definitions without terms
+UNNAMED = """() => [...document.querySelectorAll("summary, button")].some((control) => {
+  const label = control.ariaLabel ?? control.title, words = control.innerText.trim();
+  return !(label || control.textContent.trim()) || (control.ariaLabel && !label.includes(words));
+}) || [...document.querySelectorAll("dl")].some((list) => !list.querySelector(":scope > dt"))"""
 
 
 @needs_chromium
 def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
     page = browser.new_page(viewport={"width": 390, "height": 800})
-    asked, said, wide = [], [], []
+    asked, said, wide, unnamed = [], [], [], []
     page.on("request", lambda request: asked.append(request.url))
     page.on("console", lambda line: said.append(line.text) if line.type == "error" else None)
     page.on("pageerror", lambda error: said.append(str(error)))
     for path in pages(built):
         page.goto(path.as_uri())
         wide += [path.name] if page.evaluate("document.documentElement.scrollWidth") > 390 else []
+        unnamed += [path.name] if page.evaluate(UNNAMED) else []
     page.close()
+    assert unnamed == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert (said, wide) == ([], [])
 
@@ -164,6 +179,8 @@ SEARCHES = {
     "equations": "Equations",
     "numba cache": "Installation and troubleshooting",
     "cite": "References",
+    "push my robot": "Live robots",
+    "how do I push my robot": "Push recovery and parameter sweeps",
 }
 
 
@@ -173,7 +190,8 @@ def test_excerpts_of_search_results_are_sentences(built, browser):
     page.goto((built / "search.html").as_uri())
     found = """<nav><p>A cone in a list.</p></nav><div class=cell><p>cone = 0</p></div>
         <p>First. A cone opens. It has a tip.</p>"""
-    summary = f"Search.makeSearchSummary(`<div role=main>{found}</div>`, ['cone'], '')"
+    whole = f"<main role=main><ul><li>A cone menu</ul><article>{found}</article></main>"
+    summary = f"Search.makeSearchSummary(`{whole}`, ['cone'], '')"
     assert page.evaluate(f"{summary}.textContent") == "A cone opens. It has a tip."
     page.close()
 
@@ -246,13 +264,14 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
         ),
         new_code_cell("draw()", outputs=outputs),
         new_code_cell('predict("07.a", ...)', metadata={"prediction": "07.a"}),
+        new_code_cell("draw()", metadata={"tags": ["picture"]}),
         new_code_cell("assert found", metadata={"tags": ["claims"]}),
         new_code_cell("x = ...", metadata={"tags": ["exercise"]}),
         new_code_cell('check("07.1", x)', metadata={"tags": ["check"]}, outputs=outputs),
         new_code_cell('review("07")', outputs=outputs),
     ]
     made = prepare_lesson(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
-    text, draw, asked, claims, stub, check, said = made.cells
+    text, draw, asked, _, missing, opening, claims, _, stub, check, said = made.cells
     assert "what [(7)](#eq-7) is, as [lesson 06](06_cones.ipynb) and lesson 08 do" in text.source
     printed, scene, image = draw.outputs
     assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
@@ -260,7 +279,8 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
     assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
     assert all(choice in asked.source for choice in all_questions()["07.a"].choices)
     assert "(../installation.md)" in asked.source
-    assert "hide-input" in claims.metadata["tags"] and stub.source == "x = ..."
+    assert "without running" in missing.source and "1 claim," in opening.source
+    assert (claims.source, stub.source) == ("assert found", "x = ...")
     assert check.cell_type == said.cell_type == "markdown"
     assert "(../installation.md)" in check.source
     assert made.metadata["myst"]["html_meta"]["description"].startswith("It says what (7) is")

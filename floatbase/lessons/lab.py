@@ -13,8 +13,8 @@ from floatbase.errors import FloatbaseError
 from floatbase.lessons.publish.workspace import prepare_workspace
 
 FIRST = "00_start_here.ipynb"
-# JupyterLab saves twice a minute, installs no extensions, and does not look for news, updates and
-# language servers
+# JupyterLab saves twice a minute, installs no extensions, does not look for news, updates and
+# language servers, and shows the stored image of a picture whose kernel has gone
 SETTINGS = Path(__file__).parent / "jupyter"
 _TABS = ".open_tabs"  # kept with the copy, so that tabs of another copy do not open
 

@@ -61,6 +61,65 @@ def test_every_prediction_of_a_lesson_has_a_form_that_accepts_its_result(lesson)
             assert all(a <= x <= b for x, (a, b) in zip(numbers, data["right"], strict=True))
 
 
+FOLD = re.compile(
+    r'```{raw} html\n<(/?)details(?: class="(\w+)"(?: data-names="(.*?)")?><summary>(\d*))?'
+)
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_results_and_claims_of_a_lesson_are_folded_and_its_questions_are_not(lesson):
+    notebook = read_notebook(lesson_notebooks()[lesson])
+    names = list(site.results(notebook.cells))
+    claims = [c.source for c in notebook.cells if "claims" in c.metadata.get("tags", [])]
+    open_folds, found, counts, boxes = [], [], [], 0
+    for cell in site.prepare_lesson(notebook, NoPictures(), {}).cells:
+        if fold := FOLD.match(cell.source):
+            end, kind, named, count = fold.groups()
+            open_folds.pop() if end else open_folds.append(kind)
+            found += (named or "").split()
+            counts += [int(count)] if count else []
+            boxes += kind == "claims"
+            continue
+        has_heading = cell.cell_type == "markdown" and re.search(r"^#+ ", cell.source, re.M)
+        is_question = "answers-prediction" in cell.source or "**Predict " in cell.source
+        assert open_folds == [] or not (has_heading or is_question)
+        boxes = 0 if has_heading else boxes
+        texts = " ".join(output.get("text", "") for output in cell.get("outputs", []))
+        shows = any(f"{name}: " in texts for name in names) or "**Why?**" in cell.source
+        assert open_folds[:1] == ["result"] or not shows
+        assert boxes <= 1  # of a section
+    assert (open_folds, found) == ([], names)
+    assert sum(counts) == len(re.findall(r"^ *assert ", "\n".join(claims), re.M))
+
+
+@pytest.fixture
+def folded(tmp_path, browser):
+    """A page with the folded result of two predictions of lesson 03, which share it."""
+    shared = '<details class="result" data-names="03.a 03.b"><summary>Result</summary><p>13</p>'
+    write_page(tmp_path, "".join(elements("03")[:2]) + f"{shared}</details>")
+    with served(tmp_path) as address:
+        context = browser.new_context()
+        opened = context.new_page()
+        opened.goto(f"{address}/page.html")
+        yield opened
+        context.close()
+
+
+@pytest.mark.front_end
+@pytest.mark.parametrize("can_store", [True, False])
+def test_a_result_opens_when_all_its_predictions_are_made(folded, can_store):
+    if not can_store:
+        folded.evaluate("() => { Storage.prototype.setItem = () => { throw new Error(); }; }")
+    for form in folded.locator(".answers-prediction form").all():
+        assert not folded.locator("p", has_text="13").is_visible()
+        fill(form, "nonsense")
+        assert not folded.locator("p", has_text="13").is_visible()
+        fill(form, "wrong")
+    assert folded.locator("p", has_text="13").is_visible()
+    folded.reload()
+    assert folded.locator("p", has_text="13").is_visible() == can_store
+
+
 @pytest.mark.parametrize(
     ("question", "result"),
     [
@@ -210,7 +269,7 @@ def recalling(tmp_path_factory, browser):
     """A page that asks what is due."""
     folder = tmp_path_factory.mktemp("recall")
     site.recall.write_script([NOTEBOOKS / "02_equations_of_motion.ipynb"], folder)
-    write_page(folder, site.recall.recall_box(""))
+    write_page(folder, site.recall.recall_box("", offers_first=True))
     with served(folder) as address:
         opened = browser.new_page()
         opened.goto(f"{address}/page.html")
@@ -218,9 +277,27 @@ def recalling(tmp_path_factory, browser):
 
 
 @pytest.mark.front_end
+def test_a_new_reader_is_asked_a_first_question_that_comes_back(recalling):
+    page, form = recalling, recalling.locator(".answers-recall form")
+    name = form.locator("strong").first.inner_text()
+    right = page.evaluate("name => floatbaseRecall.questions[name].result", name)
+    field = form.locator("[name=answer]")
+    is_choice = field.evaluate("field => field.tagName") == "SELECT"
+    field.select_option(right) if is_choice else field.fill(str(right))
+    form.locator("button").click()
+    assert "Right: " in form.locator("output").inner_text()
+    page.reload()
+    assert form.count() == 0
+    age = "kept => localStorage.setItem('floatbase-answers', kept.replace(/20\\d\\d-/, '2020-'))"
+    page.evaluate(age, page.evaluate("localStorage.getItem('floatbase-answers')"))
+    page.reload()
+    assert form.locator("strong").first.inner_text() == name
+    page.evaluate("localStorage.clear()")
+
+
+@pytest.mark.front_end
 def test_a_reader_recalls_with_the_keyboard(recalling, tmp_path, monkeypatch):
     page, box = recalling, recalling.locator(".answers-recall")
-    assert "some days after" in box.inner_text()
     said = {"01.d": [1, 2], "01.e": "true", "02.c": "they stay", "02.d": 43.1}
     shown = {"01.d": [18, 12], "01.e": "true", "02.c": "they fly up", "02.d": 43.1}
     entry = {"unit": "", "sure": False, "time": OLD_TIME}

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import floatbase
 from floatbase import conventions
+from floatbase.lessons.publish.contents import GENERATED
 
 _PACKAGE = Path(floatbase.__file__).parent
 # their numbers choose what is drawn, not what is answered
@@ -34,13 +35,13 @@ def page() -> str:
             "",
             "Tolerances",
             "----------",
-            "Every threshold in the code: where it is and why it has that value. Generated from "
-            "the code by",
-            "`python -m floatbase.lessons.publish map`; do not edit.",
+            "Every threshold in the code: where it is and why it has that value.",
             "",
             "| file | name | value | meaning and reason |",
             "|---|---|---|---|",
             *rows,
+            "",
+            GENERATED,
             "",
         ]
     )

@@ -18,7 +18,7 @@ from importlib import import_module
 from pathlib import Path
 
 import floatbase
-from floatbase.lessons.publish.contents import equations_taught, title_of
+from floatbase.lessons.publish.contents import GENERATED, equations_taught, title_of
 from floatbase.lessons.publish.formulas import FORMULAS, NOTES, SECTIONS, Formula
 from floatbase.lessons.publish.workspace import NOTEBOOKS, lesson_notebooks
 
@@ -70,9 +70,6 @@ def table() -> str:
         "the functions that implement it and",
         "the lessons that teach it. Import a function such as `dynamics.forces_from_torques` with",
         "`from floatbase.dynamics import forces_from_torques`.",
-        "",
-        "This page is generated from docstrings and lessons by `python -m "
-        "floatbase.lessons.publish map`; do not edit it.",
     ]
     for section in SECTIONS:
         lines += ["", f"## {section.number} {section.title}", "", section.summary]
@@ -82,7 +79,8 @@ def table() -> str:
                 formula, [entry for entry in found if formula.number in entry.equations], lessons
             )
     lines += ["", "## Notes of the course text", "", "The lessons name some of them by number.", ""]
-    return "\n".join([*lines, *(f"{number}. {note}" for number, note in NOTES.items())]) + "\n"
+    lines += [f"{number}. {note}" for number, note in NOTES.items()]
+    return "\n".join([*lines, "", GENERATED]) + "\n"
 
 
 def _equation_lines(formula: Formula, found: list[Entry], lessons: list[str]) -> list[str]:

@@ -20,6 +20,7 @@ from floatbase.lessons.publish.hosted import colab_address
 from floatbase.lessons.publish.notebooks import read_notebook
 from floatbase.lessons.publish.pictures import Pictures
 from floatbase.lessons.publish.site import lecture, recall, reference
+from floatbase.lessons.publish.site.accessible import accessible
 from floatbase.lessons.publish.site.addresses import addresses
 from floatbase.lessons.publish.site.live_robots import (
     LIVE_FOLDER,
@@ -73,6 +74,8 @@ def build(folder: Path = SITE, lessons: Sequence[Path] | None = None, stored: bo
         _write_texts(source, shown, _first_picture(scene, pictures), has_live)
         _write_reference(source / "api")
         _run_sphinx(source, built)
+        for path in built.rglob("*.html"):
+            write_whole(path, accessible(path.read_text(encoding="utf-8")).encode())
         pictures.write()
         lecture.write_slides(built / "_static" / lecture.SLIDES, in_site=True)
         if has_live:
@@ -185,7 +188,7 @@ def _write_texts(source: Path, lessons: Sequence[Path], scene: str, has_live: bo
             "lessons": _lesson_table(lessons),
             "toctrees": _toctrees(lessons),
             "live script": live,
-            "recall": recall.recall_box("_static/"),
+            "recall": recall.recall_box("_static/", offers_first=True),
         }.items():
             text = text.replace(f"{{{name}}}", part) if path.parent == source else text
         way = {source: "lessons/", source / "lessons": ""}.get(path.parent, "../lessons/")

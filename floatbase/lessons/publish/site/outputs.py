@@ -24,6 +24,7 @@ from floatbase.lessons.publish.site.answers import (
     results,
     review_element,
 )
+from floatbase.lessons.publish.site.folds import fold_claims, fold_results
 from floatbase.lessons.publish.site.recall import recall_box
 from floatbase.lessons.publish.site.references import add_links
 from floatbase.lessons.questions import all_questions
@@ -32,7 +33,9 @@ RUN_PAGE = "../installation.md"
 PARALLEL_RUNS = 2  # lessons
 _HIGH_RESOLUTION = "%config InlineBackend.figure_format = 'retina'"
 _INLINE = "module://matplotlib_inline.backend_inline"
-_CLAIMS_PROMPT = "claims of the text above, as code that fails if a claim is wrong"
+_NO_PICTURE = (
+    "This site was built without running its lessons, so the picture of this cell is missing"
+)
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _CHECKED = re.compile(r'check\("(\w+\.\w+)"')
@@ -96,12 +99,17 @@ def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str,
     """Prepare a lesson for Sphinx, in place."""
     about, heading = _description(notebook), ""
     shown = results(notebook.cells)
-    for i, cell in enumerate(notebook.cells):
+    cells: list[Any] = []
+    for cell in fold_claims(fold_results(notebook.cells)):
         if cell.cell_type == "markdown":
             heading = (_HEADING.findall(cell.source) or [heading])[-1]
             cell.source = add_links(cell.source, lessons)
-        else:
-            notebook.cells[i] = _prepare_code_cell(cell, heading, pictures, shown)
+            cells.append(cell)
+            continue
+        cells.append(_prepare_code_cell(cell, heading, pictures, shown))
+        if "picture" in cell.metadata.get("tags", []) and not cell.outputs:
+            cells.append(new_markdown_cell(_live_lesson_note(_NO_PICTURE)))
+    notebook.cells = cells
     notebook.metadata.pop("widgets", None)  # widgets need a kernel
     notebook.metadata["myst"] = {"html_meta": {"description": about}}
     return notebook
@@ -136,12 +144,6 @@ def _prepare_code_cell(
         return new_markdown_cell(
             _live_lesson_note("Your predictions and solutions appear here in the live lesson")
         )
-    if "claims" in tags:
-        cell.metadata["tags"] = [*tags, "hide-input"]
-        cell.metadata["mystnb"] = {
-            "code_prompt_show": _CLAIMS_PROMPT,
-            "code_prompt_hide": _CLAIMS_PROMPT,
-        }
     cell.outputs = [part for output in cell.outputs for part in _site_outputs(output, pictures)]
     _describe_figure(cell, heading)
     return cell

@@ -62,9 +62,13 @@ def _texts(question: Question) -> dict[str, str]:
     }
 
 
-def recall_box(static: str) -> str:
-    """Return the box that asks the questions that are due, as HTML."""
-    return f'<script src="{static}{SCRIPT}"></script>\n{element_html("recall", {}, _NOTE)}'
+def recall_box(static: str, offers_first: bool = False) -> str:
+    """Return the box that asks the questions that are due, as HTML.
+
+    offers_first: whether it asks a reader who has predicted nothing yet a first question.
+    """
+    box = element_html("recall", {"offersFirst": offers_first}, _NOTE)
+    return f'<script src="{static}{SCRIPT}"></script>\n{box}'
 
 
 def write_script(lessons: Iterable[Path], folder: Path) -> None:

@@ -69,6 +69,13 @@
 
   const shownAnswer = (said) => [said].flat().join(", ");
 
+  const predicted = new Set(Object.keys(load().predictions)); // also where nothing can be stored
+  const openResults = () => {
+    for (const details of document.querySelectorAll("details.result")) {
+      details.open ||= details.dataset.names.split(" ").every((name) => predicted.has(name));
+    }
+  };
+
   const prediction = (element, data) => {
     const before = load().predictions[data.name];
     const sure = make("input", {type: "checkbox", name: "sure", checked: before?.sure ?? false});
@@ -93,6 +100,8 @@
       if (!store("predictions", data.name, {...entry, time: new Date().toISOString()})) {
         message.append(NOT_STORED);
       }
+      predicted.add(data.name);
+      openResults();
       document.dispatchEvent(new Event("answers"));
     });
     if (before) {
@@ -189,7 +198,8 @@
   const histories = ({predictions, recalled}) => Object.fromEntries(
     Object.entries(predictions).map(([name, entry]) => [name, [entry, ...recalled[name] ?? []]]));
 
-  const recallForm = (data) => {
+  // A question that is due. The answer to a first question is a prediction.
+  const recallForm = (data, isFirst) => {
     const message = make("output");
     const question = make("p", {id: `recall-${data.name}`});
     question.innerHTML = `<strong>${data.name}</strong>, ${data.topic}. ${data.context}
@@ -217,22 +227,31 @@
           ? make("a", {href: new URL(data.address, SITE).href, textContent: lesson}) : lesson;
         message.append(" Look it up in ", link, ".");
       }
-      const entry = {recalled, knew, time: new Date().toISOString()};
-      if (!store("recalled", data.name, entry)) message.append(NOT_STORED);
+      const time = new Date().toISOString();
+      const isStored = isFirst
+        ? store("predictions", data.name,
+          {said: recalled, unit: data.unit, sure: false, is: data.result, time})
+        : store("recalled", data.name, {recalled, knew, time});
+      if (!isStored) message.append(NOT_STORED);
+      else if (isFirst) message.append(" The question comes back here after some days.");
     });
     return form;
   };
 
-  const recall = (element) => {
+  const recall = (element, {offersFirst}) => {
     const {rule, questions} = globalThis.floatbaseRecall;
     const known = histories(load());
     const names = due(rule, questions, known, Date.now());
     const some = Object.keys(questions).some((name) => name in known);
+    const first = offersFirst && !some
+      && Object.values(questions).find(({address}) => address); // its lesson is on this site
     const text = names.length ? "From earlier lessons:"
       : some ? "There is nothing to recall today."
-        : "Questions from earlier lessons come back here, some days after you predicted the result.";
+        : first ? "No question is due yet. Here is a first one. Guess before you look it up:"
+          : "Questions from earlier lessons come back here, some days after you predicted the result.";
     element.replaceChildren(make("p", {textContent: text}),
-      ...names.map((name) => recallForm(questions[name])));
+      ...names.map((name) => recallForm(questions[name], false)),
+      ...first ? [recallForm(first, true)] : []);
   };
 
   const KINDS = {prediction, exercise, review, recall};
@@ -241,4 +260,5 @@
       fill(element, JSON.parse(element.dataset.answers));
     }
   }
+  openResults();
 }
