@@ -160,8 +160,8 @@ class Panel:
     def _invitation(self) -> str:
         """First sentences of the panel, which say what to do."""
         first = (
-            "Push the robot: move and release the slider “push”, or drag the robot with the Shift "
-            "key held."
+            "Drag the robot to push it, or move and release the slider “push”. Dragging elsewhere "
+            "turns the view."
         )
         if not self._playground.robot.is_floating:
             return first

@@ -77,7 +77,7 @@ def test_the_push_slider_pushes_when_it_is_released(page, field):
     assert field.last_push is None
 
 
-def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field):
+def test_the_robot_is_pushed_by_dragging_it(page, field):
     opened(page, field)
     page.wait_for_timeout(500)
     # the middle of the base on the page, and the same point moved in the direction of +y
@@ -93,13 +93,11 @@ def test_the_robot_is_pushed_by_dragging_it_with_shift(page, field):
     }"""
     (x, y), (ahead_x, ahead_y) = page.evaluate(pixels, 0.0), page.evaluate(pixels, 0.2)
     view = page.evaluate("viewer.camera.position.toArray()")
-    page.keyboard.down("Shift")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(ahead_x, ahead_y, steps=5)
     assert field.last_push is None
     page.mouse.up()
-    page.keyboard.up("Shift")
     eventually(page, lambda: field.last_push is not None)
     assert 60.0 <= field.towards <= 120.0 and field.force > 20.0
     assert page.evaluate("viewer.camera.position.toArray()") == pytest.approx(view, abs=0.05)

@@ -22,7 +22,6 @@ import {startWhenSeen, watchSight} from "./visibility.js";
 const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
-const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
@@ -80,8 +79,6 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const drawMap = createRecoveryMap(scene.viewer, {
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
   });
-  const newtons = make("output", {className: "newtons"});
-  document.body.append(newtons);
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
@@ -151,26 +148,17 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     scene.handle({type: "set_title", path: "", text});
     parent.postMessage({floatbase: "limit", text}, "*");
   });
-  const drag = createDrag(scene.viewer, {
-    isWanted: ({button}) => button === 0 && frame !== null && frame.outcome === "",
+  createDrag(scene.viewer, {
+    isWanted: () => frame !== null && frame.outcome === "",
     most: () => 2.5 * robot.weight,
-    show(now) {
-      dragged = grabbed(now);
-      const [x, y, z] = [now.at.x, now.at.y, now.at.z];
-      newtons.textContent = `${Math.hypot(...dragged.force).toFixed(0)} N`;
-      placeLabel(newtons, scene.viewer, {x, y, z});
-    },
+    show(now) { dragged = grabbed(now); },
     release(now) {
-      newtons.textContent = "";
       dragged = null;
       if (now === null) return;
       const {body, at, force: pushed} = grabbed(now);
       send({push: {body, at, force: pushed, duration: push.duration}});
       parent.postMessage({floatbase: "push", force: pushed}, "*");
     },
-  });
-  scene.viewer.renderer.domElement.addEventListener("pointermove", (event) => {
-    scene.viewer.renderer.domElement.style.cursor = drag.hit(event) ? "grab" : "";
   });
   const joints = drawing.links.map(([joint, item]) => [joint, ["meshcat", ...item.split("/")]]);
   // What a drag means: body and point in its frame, point in the world, and force, z up.
@@ -180,8 +168,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     const world = [x, -z, y], R = frame.rotations.subarray(9 * joint, 9 * joint + 9);
     const away = world.map((c, i) => c - frame.positions[3 * joint + i]);
     const at = [0, 1, 2].map((c) => R[c] * away[0] + R[3 + c] * away[1] + R[6 + c] * away[2]);
-    const rounded = STEPS_BY * Math.round(size / STEPS_BY);
-    return {body: robot.bodies[joint], joint, at, world, force: vector({force: rounded, towards})};
+    return {body: robot.bodies[joint], joint, at, world, force: vector({force: size, towards})};
   }
 
   function draw(next) {
@@ -271,11 +258,3 @@ function isBelow(object, node) {
   for (let at = object; at && node; at = at.parent) if (at === node.object) return true;
   return false;
 }
-
-function placeLabel(label, viewer, {x, y, z}) {
-  const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-  const at = viewer.camera.position.clone().set(x, y, z).project(viewer.camera);
-  label.style.left = `${(at.x + 1) / 2 * w + 12}px`;
-  label.style.top = `${(1 - at.y) / 2 * h - 28}px`;
-}
-
