@@ -291,9 +291,9 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     The first slider sets the force [N] and pushes when it is released. The second sets the
     direction [°]: 0 is forwards, 90 to the robot's left (+y at the start), 180 backwards. The
     button *push* pushes again, and dragging the robot in the picture pushes it that way. A push
-    starts the simulation, as *run* does; both first put a fallen robot back on its feet. *pause* stops the simulation, and *reset* restores the initial state and
-    both sliders. The third slider slows down time. A line shows the status and why the simulation
-    stopped.
+    starts the simulation, as *run* does; both first put a fallen robot back on its feet. *pause*
+    stops the simulation, and *reset* restores the initial state and both sliders. The third slider
+    slows down time. A line shows the status and why the simulation stopped.
 
     Parameters
     ----------
