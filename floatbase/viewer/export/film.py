@@ -107,6 +107,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Generator[Image, Non
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            window.add_init_script("window.isFilmed = true")  # sharply; see renderer.js
             window.goto(file.as_uri())
             window.wait_for_function(_IS_DRAWN, timeout=_TIMEOUT_MS)
             duration = window.evaluate(_PREPARE_JS)

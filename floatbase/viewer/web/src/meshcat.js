@@ -5,6 +5,9 @@
 
 export const three = () => MeshCat.THREE;
 
+// commands that change the page and not its picture
+const UNDRAWN = new Set(["set_title", "set_text", "add_plot_point", "set_control_value"]);
+
 export const pathNames = (path) => path.split("/").filter((name) => name);
 
 // Run meshcat's script if the page does not load it itself.
@@ -21,9 +24,9 @@ export function detachGifWorker() {
   window.onmessage = null;
 }
 
-// meshcat's viewer in an element. Throws an error if the browser has no WebGL.
-export function createViewer(pane) {
-  const viewer = new MeshCat.Viewer(pane);
+// meshcat's viewer in an element, with a renderer that draws there.
+export function createViewer(pane, renderer) {
+  const viewer = new MeshCat.Viewer(pane, true, renderer);
   // meshcat lists all objects there; the page has a panel and a menu of its own
   viewer.gui.domElement.style.display = "none";
   return viewer;
@@ -48,7 +51,7 @@ export function interceptCommands(viewer, handlers, after) {
   viewer.handle_command = (command) => {
     (handlers[command.type] ?? meshcat)(command, meshcat);
     after(command, command.type === "set_object" ? drawnObject(viewer, command.path) : undefined);
-    viewer.set_dirty();
+    if (!UNDRAWN.has(command.type)) viewer.set_dirty();
   };
 }
 

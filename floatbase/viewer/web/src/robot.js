@@ -70,7 +70,12 @@ async function start(scene, worker, {config, given, name, sight}) {
   }
 }
 
-function live(scene, worker, send, {drawing, settings, robot}, {config, given, name, sight}) {
+function live(scene, worker, post, {drawing, settings, robot}, {config, given, name, sight}) {
+  let isStale = true; // whether the robot may differ from its picture while it is paused
+  const send = (message) => {
+    isStale = true;
+    post(message);
+  };
   const {low, high} = rangeOf("push", robot);
   const force = given.read("push", numberRule(low, high), numberOf)
     ?? 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
@@ -80,7 +85,8 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
   });
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
-  let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
+  let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, drawn = 0;
+  let isPaused = false;
 
   let gait = null;
   const joystick = createJoystick(
@@ -151,7 +157,10 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   createDrag(scene.viewer, {
     isWanted: () => frame !== null && frame.outcome === "",
     most: () => 2.5 * robot.weight,
-    show(now) { dragged = grabbed(now); },
+    show(now) {
+      dragged = grabbed(now);
+      isStale = true;
+    },
     release(now) {
       dragged = null;
       if (now === null) return;
@@ -173,6 +182,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
 
   function draw(next) {
     frame = next;
+    drawn++;
     painter.draw(frame);
     const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
     if (dragged) painter.drawPush(dragged.world, dragged.force);
@@ -181,7 +191,6 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     tell(limitOf(frame, robot), performance.now());
     if (frame.time < plotted) plotted = -1;
     if (hasPanel) report();
-    scene.viewer.set_dirty();
   }
   function placeOf({body, at}) {
     const joint = robot.bodies.indexOf(body), {rotations: R, positions: p} = frame;
@@ -199,12 +208,14 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     }
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
-    written = now;
+    const rate = 1000 * drawn / (now - written);
+    [written, drawn] = [now, 0];
     text("active", multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
     text("speed", frame.factor < SLOW * slow
-      ? `This computer is too slow for real time: ${frame.factor.toFixed(2)} × real time.`
+      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer draws ` +
+        `${rate.toFixed(0)} pictures a second.`
       : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
   }
   function text(key, content) {
@@ -242,9 +253,9 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page
   (function loop() {
     requestAnimationFrame(loop);
-    if (isWaiting || !sight()) return;
-    isWaiting = true;
-    send({frame: true});
+    if (isWaiting || !sight() || (isPaused && !isStale)) return;
+    [isWaiting, isStale] = [true, false];
+    post({frame: true});
   })();
 }
 

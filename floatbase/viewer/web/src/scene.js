@@ -10,12 +10,15 @@ import {splitFrame} from "./loader.js";
 import {createViewer, interceptCommands} from "./meshcat.js";
 import {createPanel} from "./panel.js";
 import {createPlayer} from "./player.js";
+import {adaptPixels, createRenderer} from "./renderer.js";
 import {createTheme} from "./theme.js";
 
 // config: {mode, backgrounds, shades}, see page.js and theme.js. Throws an error if the browser has
 // no WebGL.
 export function createScene(config) {
-  const viewer = createViewer(element("meshcat-pane"));
+  const pane = element("meshcat-pane"), {renderer, isCheap} = createRenderer(pane);
+  const viewer = createViewer(pane, renderer);
+  adaptPixels(viewer, isCheap);
   let send = () => {};
   const player = createPlayer(viewer);
   const panel = createPanel({
@@ -34,9 +37,12 @@ export function createScene(config) {
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
   if (config.mode !== "robot") createDrag(viewer, sliderDrag(panel.controls));
-  new ResizeObserver(([{target}]) => {
-    element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
-  }).observe(element("title"));
+  const title = element("title");
+  const sizes = new ResizeObserver(() => {
+    element("board").style.top = `${title.offsetTop + title.offsetHeight + 6}px`;
+    viewer.set_dirty();
+  });
+  for (const one of [title, element("panel")]) sizes.observe(one);
   const handlers = {
     set_camera: camera.look,
     set_follow: camera.setFollow,

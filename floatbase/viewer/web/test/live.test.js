@@ -22,6 +22,18 @@ test("a clock gives the steps of the time that has passed, in slow motion too", 
   assert.equal(clock.steps(1032), 4);
 });
 
+test("with slow pictures the clock slows down, so that a push of 0.1 s is seen in several", () => {
+  const clock = createClock(1e-3);
+  clock.steps(0);
+  assert.equal(clock.steps(100), 100);
+  assert.equal(clock.steps(400), 100);
+  let pictures = 0;
+  for (let gone = 0, now = 400; gone < 100; pictures++) gone += clock.steps(now += 250, true);
+  assert.ok(pictures >= 3);
+  clock.done(30, 1);
+  assert.ok(clock.factor < 1);
+});
+
 test("a paused clock gives single steps only", () => {
   const clock = createClock(1e-3);
   clock.steps(0);
