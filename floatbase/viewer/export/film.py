@@ -40,6 +40,7 @@ _REQUIREMENTS = (
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _PREPARE_JS = """() => {
     const {animator} = viewer;
+    document.body.classList.remove("has-panel");
     const controls = "#player, #panel, #fold, #board, #tools, #legend.folded";
     for (const one of document.querySelectorAll(controls)) one.style.visibility = "hidden";
     if (!animator.duration) return 0;

@@ -11,6 +11,7 @@ import {createDrag} from "./drag.js";
 import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
 import {readAddress} from "./live/attributes.js";
 import {controlsOf} from "./live/controls.js";
+import {createHint, triesOf} from "./live/hints.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
@@ -30,6 +31,7 @@ const EXPLAINED = { // texts of the panel's sections
   "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
     "that term in the controller's model or in reality.",
 };
+const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -74,6 +76,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   let isStale = true; // whether the robot may differ from its picture while it is paused
   const send = (message) => {
     isStale = true;
+    if (message.push) hasPushed();
     post(message);
   };
   const {low, high} = rangeOf("push", robot);
@@ -85,8 +88,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
   });
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
-  let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, drawn = 0;
-  let isPaused = false;
+  let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
   let gait = null;
   const joystick = createJoystick(
@@ -110,6 +112,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     },
   });
   const changes = new Map(controls.map(({command, change}) => [command.name, change]));
+  const hasPushed = createHint(hasPanel ? triesOf(robot) : []);
   const buttons = {
     push: () => ({push: {force: vector(push), duration: push.duration}}),
     "stand up": () => ({reset: true}),
@@ -136,6 +139,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     }
   }
   else document.body.append(pushButton());
+  if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
   scene.onMessage(({name: key, value}) => {
     if (frame === null) return;
     const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
@@ -182,7 +186,6 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
 
   function draw(next) {
     frame = next;
-    drawn++;
     painter.draw(frame);
     const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
     if (dragged) painter.drawPush(dragged.world, dragged.force);
@@ -208,14 +211,12 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     }
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
-    const rate = 1000 * drawn / (now - written);
-    [written, drawn] = [now, 0];
+    written = now;
     text("active", multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
     text("speed", frame.factor < SLOW * slow
-      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer draws ` +
-        `${rate.toFixed(0)} pictures a second.`
+      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer draws slowly.`
       : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
   }
   function text(key, content) {

@@ -21,28 +21,23 @@ export function createScene(config) {
   adaptPixels(viewer, isCheap);
   let send = () => {};
   const player = createPlayer(viewer);
-  const panel = createPanel({
-    report(message) {
-      send(message);
-      address?.changed();
-    },
-    redraw: () => viewer.set_dirty(),
+  const panel = createPanel((message) => {
+    send(message);
+    address?.changed();
   });
   const address = config.mode === "live" ? createAddress(panel.controls, (text) => {
     panel.setText({name: "address", text});
   }) : null;
-  const camera = createCamera(viewer, panel);
+  const camera = createCamera(viewer);
   const theme = createTheme(viewer, config);
-  const legend = createLegend(camera, theme.colour);
+  const legend = createLegend(theme.colour);
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
   if (config.mode !== "robot") createDrag(viewer, sliderDrag(panel.controls));
-  const title = element("title");
-  const sizes = new ResizeObserver(() => {
-    element("board").style.top = `${title.offsetTop + title.offsetHeight + 6}px`;
-    viewer.set_dirty();
-  });
-  for (const one of [title, element("panel")]) sizes.observe(one);
+  new ResizeObserver(([{target}]) => {
+    element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
+  }).observe(element("title"));
+  new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane); // the panel takes its room
   const handlers = {
     set_camera: camera.look,
     set_follow: camera.setFollow,
@@ -78,6 +73,7 @@ export function createScene(config) {
   return {
     viewer,
     controls: panel.controls,
+    foldPanel: panel.fold,
     // Draw a frame. A command that fails is reported; the others are still executed.
     apply(frame) {
       for (const command of splitFrame(frame)) {
