@@ -183,7 +183,7 @@ def test_a_paused_challenge_continues_with_run(field):
 
 def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field):
     first = (field.force, field.towards)
-    changes = {"speed": 0.1, "push [N]": 200, "show forces": "false", "show gravity": "true"}
+    changes = {"speed [×]": 0.1, "push [N]": 200, "show forces": "false", "show gravity": "true"}
 
     def shown():
         opened(page, field)
@@ -242,8 +242,8 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
     opened(page, field)
     assert page.evaluate("location.hash") == ""
     control(page, "facets", "setValue(7)")
-    control(page, "lift FL_foot", "setValue(true)")
-    control(page, "speed", "setValue(0.5)")
+    control(page, "lift front left foot", "setValue(true)")
+    control(page, "speed [×]", "setValue(0.5)")
     page.wait_for_function("location.hash == '#lift+FL_foot=on&facets=7'")
     control(page, "undo", "fire()")
     page.wait_for_function("location.hash == '#facets=7'")

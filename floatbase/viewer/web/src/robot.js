@@ -10,7 +10,7 @@ import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
 import {readAddress} from "./live/attributes.js";
-import {controlsOf} from "./live/controls.js";
+import {controlsOf, labelOf} from "./live/controls.js";
 import {createHint, triesOf} from "./live/hints.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
@@ -22,7 +22,6 @@ import {startWhenSeen, watchSight} from "./visibility.js";
 
 const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
-const DEFAULT_PUSH = 0.25; // times the weight
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
@@ -31,6 +30,8 @@ const EXPLAINED = { // texts of the panel's sections
   "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
     "that term in the controller's model or in reality.",
 };
+const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playground, " +
+  "`floatbase view talos`.";
 const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
@@ -79,10 +80,9 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     if (message.push) hasPushed();
     post(message);
   };
-  const {low, high} = rangeOf("push", robot);
-  const force = given.read("push", numberRule(low, high), numberOf)
-    ?? 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
-  const push = {force, towards: 90, duration: rows.duration.first};
+  const {low, high, first} = rangeOf("push", robot);
+  const force = given.read("push", numberRule(low, high), numberOf) ?? first;
+  const push = {force, towards: rows.towards.first, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
@@ -103,9 +103,14 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     send({set: {gait, lifted: null}});
     if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
   }
-  const first = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
-  const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    names: config.robots, name, walk,
+  const firstGait = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
+  const shove = () => ({push: {force: vector(push), duration: push.duration}});
+  const pause = (isNow) => {
+    isPaused = isNow;
+    return {pause: isNow};
+  };
+  const controls = controlsOf(robot, {...settings, gait: firstGait}, push, {
+    names: config.robots, name, walk, shove,
     open(other) {
       given.texts.set("name", other);
       location.search = given.texts;
@@ -114,27 +119,31 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   const changes = new Map(controls.map(({command, change}) => [command.name, change]));
   const hasPushed = createHint(hasPanel ? triesOf(robot) : []);
   const buttons = {
-    push: () => ({push: {force: vector(push), duration: push.duration}}),
-    "stand up": () => ({reset: true}),
-    pause() {
-      isPaused = !isPaused;
-      return {pause: isPaused};
+    push_button: shove,
+    run: () => pause(false),
+    pause: () => pause(true),
+    step: () => ({...pause(true), step: true}),
+    reset: () => ({reset: true}),
+    reset_all() {
+      for (const {command, change} of controls.filter(({command}) => command.name !== "robot")) {
+        if (command.name !== labelOf(rows.push)) send(change(command.value) ?? {});
+        scene.handle({...command, type: "set_control_value"});
+      }
+      push.force = force;
+      return {...pause(false), reset: true};
     },
-    step() {
-      isPaused = true;
-      return {pause: true, step: true};
-    },
-    "push-recovery map"() {
+    map() {
       const {settings: present, com} = frame;
       drawMap({...present, lifted: null, gait: null}, com);
     },
   };
+  const presses = new Map(Object.entries(buttons).map(([key, press]) => [rows[key].name, press]));
   if (hasPanel) {
-    for (const key of Object.keys(buttons)) {
-      scene.handle({type: "set_control", path: "", name: key});
-    }
+    for (const name of presses.keys()) scene.handle({type: "set_control", path: "", name});
     for (const {command} of controls) scene.handle(command);
-    for (const [section, content] of Object.entries(EXPLAINED)) {
+    const explained = {...EXPLAINED};
+    if (!Object.keys(robot.gaits).length) explained[rows.gait.section] = STANDS_ONLY;
+    for (const [section, content] of Object.entries(explained)) {
       scene.handle({type: "set_text", path: "", name: "explained", text: content, section});
     }
   }
@@ -142,7 +151,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
   scene.onMessage(({name: key, value}) => {
     if (frame === null) return;
-    const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
+    const message = (presses.get(key) ?? changes.get(key))?.(value);
     if (message) send(message);
   });
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
@@ -151,7 +160,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   function pushButton() {
     return make("button", {
       type: "button", className: "push", textContent: `push ${push.force} N`,
-      onclick: () => send(buttons.push()),
+      onclick: () => send(shove()),
     });
   }
   const tell = createVoice((text) => {
@@ -205,17 +214,19 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     // at the first picture there are no measured forces yet
     if (frame.time >= plotted + PLOT_PERIOD && frame.time > 0) {
       plotted = frame.time;
-      const away = frame.planned.map((x, i) => x - frame.measured[i]);
-      scene.handle({type: "add_plot_point", path: "", name: "planned minus measured force",
-        unit: "N", t: frame.time, value: Math.hypot(...away)});
+      const away = frame.planned.map((x, i) => x - frame.measured[i]), {name: quantity, unit} =
+        rows.force_error;
+      const value = robot.points.reduce(
+        (sum, _, i) => sum + Math.hypot(...away.subarray(3 * i, 3 * i + 3)), 0);
+      scene.handle({type: "add_plot_point", path: "", name: quantity, unit, t: frame.time, value});
     }
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
     written = now;
     text("active", multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
-    const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
-    text("speed", frame.factor < SLOW * slow
+    const wanted = scene.controls[labelOf(rows.speed)].getValue();
+    text("speed", frame.factor < SLOW * wanted
       ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer draws slowly.`
       : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
   }
@@ -239,7 +250,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     tell({rank: -2, text: content, stays: REFUSAL_TIME}, performance.now());
     parent.postMessage({floatbase: "refused", text: content}, "*");
   }
-  if (first) walk(first);
+  if (firstGait) walk(firstGait);
   let isLive = false;
   function announce() {
     isLive = true;
