@@ -124,6 +124,9 @@ export function createCamera(viewer) {
       gone.set(0, 0, 0);
       isFirst = true;
     },
+    // where it is and what it looks at, before it followed anything: six numbers
+    view: () => [viewer.camera.position, viewer.controls.target]
+      .flatMap((at) => at.clone().sub(gone).toArray()),
     setGround({planes, boxes}) { ground = {planes, boxes}; },
     setFollow(command) {
       path = pathNames(command.node);

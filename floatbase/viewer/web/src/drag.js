@@ -102,6 +102,7 @@ const FORCE = "push [N]", DIRECTION = "towards [°]";
 export const sliderDrag = (controls) => ({
   isWanted: () => Boolean(controls[FORCE] && controls[DIRECTION]),
   most: () => controls[FORCE].getMax(),
+  now: () => [controls[FORCE].getValue(), controls[DIRECTION].getValue()],
   show({force, towards}) {
     controls[FORCE].show(force);
     controls[DIRECTION].show(towards);

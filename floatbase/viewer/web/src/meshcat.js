@@ -27,6 +27,9 @@ export function detachGifWorker() {
 // meshcat's viewer in an element, with a renderer that draws there.
 export function createViewer(pane, renderer) {
   const viewer = new MeshCat.Viewer(pane, true, renderer);
+  // Why: meshcat takes the height of the window, but a panel may be below the picture
+  const resize = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => resize(pane.clientWidth, pane.clientHeight);
   // meshcat lists all objects there; the page has a panel and a menu of its own
   viewer.gui.domElement.style.display = "none";
   return viewer;

@@ -57,4 +57,8 @@ export function adaptPixels(viewer, isCheap) {
     times.push(performance.now() - begun);
     isCheap = times.length === TRIED && Math.min(...times) > SLOW;
   };
+  viewer.capture_image = () => {
+    draw(MOST_PIXELS);
+    return renderer.domElement.toDataURL();
+  };
 }

@@ -2,8 +2,8 @@
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
 // config: as for the viewer, with `robots`, the names to choose from. The address may have
-// ?name=…&mu=…&push=…&gait=…&panel=0. Values that make no sense are refused in words, and count as
-// not given.
+// ?name=…&mu=…&push=…&gait=…&panel=0, and after # the settings, the view and a push, see address.js
+// and docs/embed.md. Values that make no sense are refused in words, and count as not given.
 
 import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
@@ -33,6 +33,7 @@ const EXPLAINED = { // texts of the panel's sections
 const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playground, " +
   "`floatbase view talos`.";
 const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
+const PUSHED_AFTER = 1; // s: when the push in an address acts
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -75,9 +76,13 @@ async function start(scene, worker, {config, given, name, sight}) {
 
 function live(scene, worker, post, {drawing, settings, robot}, {config, given, name, sight}) {
   let isStale = true; // whether the robot may differ from its picture while it is paused
+  let pushed = null; // the last push, as the worker gets it
   const send = (message) => {
     isStale = true;
-    if (message.push) hasPushed();
+    if (message.push) {
+      hasPushed();
+      pushed = message.push;
+    }
     post(message);
   };
   const {low, high, first} = rangeOf("push", robot);
@@ -133,11 +138,16 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
       return {...pause(false), reset: true};
     },
     map() {
+      if (frame === null) return;
       const {settings: present, com} = frame;
       drawMap({...present, lifted: null, gait: null}, com);
     },
   };
   const presses = new Map(Object.entries(buttons).map(([key, press]) => [rows[key].name, press]));
+  scene.onMessage(({name: key, value}) => { // also while the address sets the controls
+    const message = (presses.get(key) ?? changes.get(key))?.(value);
+    if (message) send(message);
+  });
   if (hasPanel) {
     for (const name of presses.keys()) scene.handle({type: "set_control", path: "", name});
     for (const {command} of controls) scene.handle(command);
@@ -149,11 +159,6 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   }
   else document.body.append(pushButton());
   if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
-  scene.onMessage(({name: key, value}) => {
-    if (frame === null) return;
-    const message = (presses.get(key) ?? changes.get(key))?.(value);
-    if (message) send(message);
-  });
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
 
   // Without the panel, a button pushes, also for those who use no mouse.
@@ -251,6 +256,21 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     parent.postMessage({floatbase: "refused", text: content}, "*");
   }
   if (firstGait) walk(firstGait);
+  // What the address has beside the controls: how the robot walks, and a push after a second. A
+  // push is the number of a joint, or -1 for the middle of the base, a point, a force, a duration.
+  scene.lookAsAddressed();
+  const motion = scene.address.numbers("motion", 2), again = scene.address.numbers("pushed", 8);
+  if (motion && gait !== null) joystick.move(...motion);
+  if (again) {
+    const [joint, x, y, z, ...rest] = again, acts = {force: rest.slice(0, 3), duration: rest[3]};
+    const at = joint < 0 ? {} : {body: robot.bodies[joint], at: [x, y, z]};
+    send({push: {...acts, ...at, start: PUSHED_AFTER}});
+  }
+  scene.onLink(() => ({
+    motion: gait === null ? undefined : joystick.at(),
+    pushed: pushed && [robot.bodies.indexOf(pushed.body), ...pushed.at ?? [0, 0, 0],
+      ...pushed.force, pushed.duration],
+  }));
   let isLive = false;
   function announce() {
     isLive = true;
