@@ -5,6 +5,8 @@
 
 export const three = () => MeshCat.THREE;
 
+const UNSEEN = 5e-5; // m
+
 // commands that change the page and not its picture
 const UNDRAWN = new Set(["set_title", "set_text", "add_plot_point", "set_control_value"]);
 
@@ -51,10 +53,24 @@ export function beforeRender(viewer, hook) {
 // Why: meshcat ignores types that it does not know, and a theme recolours what a command makes.
 export function interceptCommands(viewer, handlers, after) {
   const meshcat = viewer.handle_command.bind(viewer);
+  const isUnseen = createUnseen();
   viewer.handle_command = (command) => {
+    if (isUnseen(command)) return;
     (handlers[command.type] ?? meshcat)(command, meshcat);
     after(command, command.type === "set_object" ? drawnObject(viewer, command.path) : undefined);
     if (!UNDRAWN.has(command.type)) viewer.set_dirty();
+  };
+}
+
+// Whether a command moves an item by so little that nobody sees it, as of a robot that stands.
+export function createUnseen() {
+  const placed = new Map(); // path -> matrix
+  return ({type, path, matrix}) => {
+    if (type === "delete") placed.clear();
+    if (type !== "set_transform") return false;
+    const isSame = placed.get(path)?.every((x, i) => Math.abs(x - matrix[i]) < UNSEEN) ?? false;
+    if (!isSame) placed.set(path, matrix);
+    return isSame;
   };
 }
 

@@ -232,7 +232,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls[labelOf(rows.speed)].getValue();
     text("speed", frame.factor < SLOW * wanted
-      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer draws slowly.`
+      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer is too slow for more.`
       : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
   }
   function text(key, content) {

@@ -17,7 +17,6 @@ const cross = (a, b) => [
 const unit = (a) => a.map((c) => c / Math.hypot(...a));
 const scaled = ([x, y, z], [sx, sy, sz]) => [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, sz, 0, x, y, z, 1];
 
-const UNSEEN = 2e-4; // m: nobody sees a smaller motion, and a robot that stands is not drawn again
 const GRID = 1; // m: steps in which the lines on the ground follow the robot
 
 // How a force lies in the cone with friction coefficient mu, as the viewer colours it.
@@ -30,13 +29,9 @@ export function coneStatus([x, y, z], mu, least) {
 // scene: of the page. drawing: sizes and paths, see floatbase/live/scenes.py.
 export function createPainter(scene, drawing, robot) {
   const path = (item) => `/meshcat/${item}`;
-  const placed = new Map(); // item -> its last matrix
-  function place(item, matrix) {
-    const before = placed.get(item);
-    if (before?.every((x, i) => Math.abs(x - matrix[i]) < UNSEEN)) return;
-    placed.set(item, matrix);
-    scene.handle({type: "set_transform", path: path(item), matrix});
-  }
+  const place = (item, matrix) => scene.handle(
+    {type: "set_transform", path: path(item), matrix},
+  );
   const known = new Map(); // item and property -> text of its value; only changes are sent
   function set(item, property, value) {
     const key = `${item} ${property}`, text = String(value);
