@@ -66,7 +66,7 @@ export function interceptCommands(viewer, handlers, after) {
 export function createUnseen() {
   const placed = new Map(); // path -> matrix
   return ({type, path, matrix}) => {
-    if (type === "delete") placed.clear();
+    if (type === "delete" || type === "set_animation") placed.clear(); // or moved by others
     if (type !== "set_transform") return false;
     const isSame = placed.get(path)?.every((x, i) => Math.abs(x - matrix[i]) < UNSEEN) ?? false;
     if (!isSame) placed.set(path, matrix);

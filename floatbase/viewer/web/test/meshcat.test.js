@@ -11,4 +11,6 @@ test("an item that hardly moves is not drawn again, until it has moved farther",
   assert.ok(!isUnseen({type: "set_object", path}));
   assert.ok(!isUnseen({type: "delete", path: ""}));
   assert.ok(!isUnseen(at(8e-5))); // it was made again
+  assert.ok(!isUnseen({type: "set_animation", path: "", animations: []}));
+  assert.ok(!isUnseen(at(8e-5))); // the animation has moved it
 });
