@@ -24,6 +24,7 @@ from floatbase._validation import (
 )
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, recorded_pushes
+from floatbase.live.settings import SETTINGS
 from floatbase.simulation import Controller, LiveSimulation, Push, Rollout, Simulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
@@ -290,11 +291,10 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
     The first slider sets the force [N] and pushes when it is released. The second sets the
     direction [°]: 0 is forwards, 90 to the robot's left (+y at the start), 180 backwards. The
-    button *push* pushes again, and dragging the robot in the picture with Shift held pushes it that
-    way. A push starts the simulation, as *run* does; both first put a fallen
-    robot back on its feet. *pause* stops the simulation, and *reset* restores the initial state and
-    both sliders. The third slider slows down time. A line shows the status and why the simulation
-    stopped.
+    button *push* pushes again, and dragging the robot in the picture pushes it that way. A push
+    starts the simulation, as *run* does; both first put a fallen robot back on its feet. *pause*
+    stops the simulation, and *reset* restores the initial state and both sliders. The third slider
+    slows down time. A line shows the status and why the simulation stopped.
 
     Parameters
     ----------
@@ -319,9 +319,13 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     as_instance("run", run, LiveSimulation)
     as_instance("view", view, Viewer)
     max_force = as_positive("max_force", max_force, "N")
-    force = labelled_slider("push [N]", -max_force, 0.0, max_force, 5.0, on_release=True)
-    towards = labelled_slider("towards [°]", -180.0, 90.0, 180.0, 15.0, on_release=True)
-    speed = labelled_slider("slow motion [×]", 0.05, 1.0, 1.0, 0.05)
+    force = labelled_slider(
+        SETTINGS["push"].label, 0.0, 0.0, max_force, SETTINGS["push"].step, on_release=True
+    )
+    towards, speed = (
+        labelled_slider(row.label, row.low, row.first, row.high, row.step, on_release=True)
+        for row in (SETTINGS["towards"], SETTINGS["speed"])
+    )
     speed.observe(lambda change: run.set_time_scale(change["new"]), names="value")
     line = _StatusLine(run)
 
@@ -331,8 +335,7 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
             return
         run.push(Push.horizontal(force.value, towards.value).force)
         line.show_status(
-            f"pushed with {abs(force.value):.0f} N {_direction_text(force.value, towards.value)} "
-            f"for 0.1 s"
+            f"pushed with {force.value:.0f} N {_direction_text(towards.value)} for 0.1 s"
         )
 
     def let_go(change: dict[str, Any]) -> None:
@@ -412,8 +415,8 @@ def _button(text: str, pressed: Callable[[widgets.Button], None]) -> widgets.But
     return made
 
 
-def _direction_text(force: float, towards: float) -> str:
+def _direction_text(towards: float) -> str:
     """Return the direction of a push in words, or as an angle if there is no word."""
-    angle = round(towards + (180.0 if force < 0 else 0.0)) % 360
+    angle = round(towards) % 360
     words = {0: "forwards", 90: "to the left", 180: "backwards", 270: "to the right"}
     return words.get(angle, f"towards {angle if angle <= 180 else angle - 360}°")

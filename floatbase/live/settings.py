@@ -1,12 +1,14 @@
-"""The settings that a learner can change in the live page and in the playground.
+"""The controls of the live page, the playground and the lessons.
 
-`settings.json` has one row for each setting. Name, unit and range are the same on both pages. The
-live page contains the table (`make web`), and its engine accepts no other values.
+`settings.json` has one row for each control. Name, unit, range and initial value are the same in
+all of its places. The live page contains the table (`make web`), and its engine accepts no other
+values.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,22 +18,30 @@ _ROWS: dict[str, dict[str, Any]] = json.loads(
 
 
 class Setting(NamedTuple):
-    """A setting: its name, its range in its own unit, and its initial value."""
+    """A control: its name, its range in its own unit, and its initial value."""
 
     name: str
+    places: str = ""  # "live", "playground", "lesson": the pages that have it
     symbol: str = ""
     unit: str = ""
     section: str = ""  # of the panel
     low: float = 0.0
     high: float = 0.0  # of a push in robot weights, of a payload in robot masses
     step: float = 0.0
-    first: float = 0.0
+    first: float = 0.0  # of a push in robot weights
     scale: float = 1.0  # SI units per unit
 
     @property
     def range(self) -> tuple[float, float, float]:
         """Smallest and largest value, and step."""
         return self.low, self.high, self.step
+
+    def of_weight(self, weight: float) -> Setting:
+        """Return the setting of a push in newtons, for a robot of this weight [N]."""
+        return self._replace(
+            high=5.0 * math.ceil(self.high * weight / 5.0),
+            first=max(self.step, round(self.first * weight)),
+        )
 
     @property
     def label(self) -> str:

@@ -7,6 +7,7 @@ from floatbase.errors import explain_arguments
 from floatbase.playground.build import nodding_rotation
 from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
 from floatbase.playground.equation import EQUATION, SYMBOLS, Term
+from floatbase.playground.limits import limit_text
 from floatbase.playground.mismatch import ModelMismatch
 from floatbase.playground.page import Playground, mean_force_error, playground
 from floatbase.playground.perturbed import BaseMotors, Perturbation, PerturbedSimulation
@@ -32,6 +33,7 @@ __all__ = [
     "Session",
     "Settings",
     "Term",
+    "limit_text",
     "mean_force_error",
     "nodding_rotation",
     "playground",

@@ -18,6 +18,7 @@ from floatbase.live.settings import SETTINGS
 from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
 from floatbase.playground.equation import SYMBOLS
+from floatbase.playground.limits import limit_text
 from floatbase.playground.panel import Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
 from floatbase.playground.session import PERIOD, Session
@@ -32,8 +33,6 @@ from floatbase.viewer.export.recording import joint_limits_at, push_at
 _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands still."
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
-_DEFAULT_PUSH = 60.0  # N: go2 moves visibly and keeps standing
-_LARGEST_DEFAULT_PUSH = 0.4  # times the weight, for light robots
 _MAX_HISTORY = 100  # changes that `undo` remembers
 _SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
@@ -79,8 +78,9 @@ class Playground:
         )
         self.session = Session(robot, settings)
         self._initial_settings = self.session.settings
-        self.force = self._default_push  # N
-        self.towards = 0.0  # degrees: 0 is forwards, 90 to the left
+        self.push_setting = SETTINGS["push"].of_weight(robot.weight)
+        self.force = self.push_setting.first  # N
+        self.towards = SETTINGS["towards"].first  # degrees: 0 is forwards, 90 to the left
         # of an arm, its tip
         self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name
         self.outcome = ""
@@ -111,11 +111,6 @@ class Playground:
     def url(self) -> str:
         """Address of the page. The page has no port before this is read."""
         return self.view.url
-
-    @property
-    def _default_push(self) -> float:
-        """Initial force of the push [N]."""
-        return min(_DEFAULT_PUSH, _LARGEST_DEFAULT_PUSH * self.robot.weight)
 
     def start(self) -> Playground:
         """Show the robot and start the run.
@@ -247,7 +242,8 @@ class Playground:
 
         During a challenge, its initial settings are restored.
         """
-        self.force, self.towards, self.last_push = self._default_push, 0.0, None
+        self.force, self.towards = self.push_setting.first, SETTINGS["towards"].first
+        self.last_push = None
         self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
         self.run.set_time_scale(1.0)
         self._panel.show_view_settings(1.0)
@@ -401,29 +397,26 @@ class Playground:
             self._pause_after_slice = False
             self.run.pause()
         if self.robot.is_floating:
-            self.view.add_plot_point(
-                "difference between planned and measured forces",
-                float(record.time[-1]),
-                mean_force_error(record),
-                "N",
-            )
+            name, unit = SETTINGS["force_error"].name, SETTINGS["force_error"].unit
+            error = mean_force_error(record)
+            self.view.add_plot_point(name, float(record.time[-1]), error, unit)
 
     def _draw(self, record: fb.Rollout) -> None:
-        """Draw the last row of a slice, with time, real-time factor and messages in the title."""
+        """Draw the last row of a slice, and say in the title what limits the robot."""
         now, session = float(record.time[-1]), self.session
         with self._drawing_lock:
             factor = self.real_time_factor.update(now)
-            rate = "" if factor is None else f", {factor:.0%} of real time"
-            gait = f", {session.settings.gait}" if session.settings.gait else ""
-            headline = (
-                f"{self.robot.name}{gait}, {now:.1f} s{rate}, control step {1e3 * PERIOD:g} ms"
+            rate = "" if factor is None else f", {factor:.2f} × real time"
+            self.view.add_text(
+                "state", f"{self.robot.name}, {now:.1f} s{rate}, control step {1e3 * PERIOD:g} ms"
             )
+            said = [self.outcome or limit_text(record, session.settings), session.refusal]
             self.view.show(
                 record.final, record.contacts, record.measured[-1], _last_planned_forces(record),
                 push=push_at(record, -1, PUSH_DISPLAY_TIME), **joint_limits_at(record, -1),
                 cones=self.shown_terms["cones"], arrows=self.shown_terms["forces"], support=True,
                 extra=self._term_arrows(record),
-                title="\n".join(filter(None, [headline, self.outcome, session.refusal])),
+                title="\n".join(filter(None, said)),
             )  # fmt: skip
 
     def _term_arrows(self, record: fb.Rollout) -> Picture:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from floatbase.live.settings import SETTINGS, Setting
 from floatbase.playground.challenges import CHALLENGES
 from floatbase.playground.equation import EQUATION
+from floatbase.playground.limits import foot_name
 from floatbase.playground.settings import GAITS, Settings, six_digits
 from floatbase.playground.term_arrows import TERM_LEGEND
 from floatbase.robots import Foot
@@ -66,7 +67,9 @@ _QP_SLIDERS = (
         for index, name in enumerate(("motion", "posture", "effort"))
     ),
 )
-_PUSH, _TOWARDS, _LIFT, _GAIT = (SETTINGS[key] for key in ("push", "towards", "lift", "gait"))
+_TOWARDS, _SPEED, _LIFT, _GAIT, _CHALLENGE = (
+    SETTINGS[key] for key in ("towards", "speed", "lift", "gait", "challenge")
+)
 _SWITCH_WORDS = {"assumed_off": "model", "actual_off": "reality"}  # texts on the switches
 _FREE_PLAY = "free play"
 
@@ -81,21 +84,21 @@ class Panel:
     def _add(self) -> None:
         """Add all controls."""
         play, view = self._playground, self._playground.view
-        view.add_button("run", play.run.start)
-        view.add_button("pause", play.run.pause)
-        view.add_button("reset", play.run.reset)
-        view.add_button("push", play.push)
-        if play.robot.is_floating:
-            view.add_button("undo", play.undo)
-        view.add_button("reset everything", play.reset_all)
+        for key, press in {
+            "push_button": play.push,
+            "run": play.run.start,
+            "pause": play.run.pause,
+            "reset": play.run.reset,
+            "undo": play.undo,
+            "reset_all": play.reset_all,
+        }.items():
+            if key != "undo" or play.robot.is_floating:
+                view.add_button(SETTINGS[key].name, press)
         view.add_text("invitation", self._invitation)
-        view.add_slider("speed", play.run.set_time_scale, 1.0, 0.05, 1.0, 0.05)
-        most = _PUSH.high * play.robot.weight
-        view.add_slider(
-            _PUSH.label, self._push, play.force, _PUSH.low, most, _PUSH.step, on_release=True
-        )
-        towards = partial(setattr, play, "towards")
+        push, towards = play.push_setting, partial(setattr, play, "towards")
+        view.add_slider(push.label, self._push, play.force, *push.range, on_release=True)
         view.add_slider(_TOWARDS.label, towards, play.towards, *_TOWARDS.range)
+        view.add_slider(_SPEED.label, play.run.set_time_scale, _SPEED.first, *_SPEED.range)
         if not play.robot.is_floating:
             return
         settings = play.session.settings
@@ -137,7 +140,7 @@ class Panel:
                 *(f"{i + 1}. {challenge.title}" for i, challenge in enumerate(CHALLENGES)),
             ]
             self._playground.view.add_dropdown(
-                "challenge",
+                _CHALLENGE.label,
                 lambda i: self._playground.start_challenge(CHALLENGES[i - 1] if i else None),
                 titles,
             )
@@ -160,8 +163,8 @@ class Panel:
     def _invitation(self) -> str:
         """First sentences of the panel, which say what to do."""
         first = (
-            "Push the robot: move and release the slider “push”, or drag the robot with the Shift "
-            "key held."
+            "Drag the robot to push it, or move and release the slider “push”. Dragging elsewhere "
+            "turns the view."
         )
         if not self._playground.robot.is_floating:
             return first
@@ -226,8 +229,8 @@ class Panel:
         """Show the push, the speed and the displayed terms in their controls."""
         play = self._playground
         values: dict[str, Any] = {
-            "speed": speed,
-            _PUSH.label: play.force,
+            _SPEED.label: speed,
+            play.push_setting.label: play.force,
             _TOWARDS.label: play.towards,
         }
         if play.robot.is_floating:
@@ -256,4 +259,4 @@ class Panel:
 
 def _lift_name(foot: Foot) -> str:
     """Return the name of the control that lifts a foot."""
-    return f"{_LIFT.label} {foot.frame}"
+    return f"{_LIFT.label} {foot_name(foot.frame)}"

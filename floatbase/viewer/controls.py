@@ -109,7 +109,7 @@ class Controls:
         self.window.put([protocol.page_command("add_plot_point", name=name, **point)])
 
     def on_drag(self, pushed: Callable[[float, float], None], max_force: float) -> None:
-        """Set the function that is called when the user drags the robot with Shift held down."""
+        """Set the function that is called when the user drags the robot in the picture."""
         pushed = as_callable("pushed", pushed, "pushed(force, towards)")
         max_force = as_positive("max_force", max_force, "N")
         direction = 0.0

@@ -17,6 +17,7 @@ from waiting import until
 import floatbase as fb
 from floatbase.lessons import lessonC, live_run, push_panel, slider_panel
 from floatbase.lessons.slider_samples import panel_samples
+from floatbase.live.settings import SETTINGS
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -136,6 +137,17 @@ class Pushed:
         return None if item is None else np.array(item.matrix[:3, 2])
 
 
+def test_a_push_panel_has_the_words_of_the_table_of_controls(panel):
+    sliders = panel.force, panel.towards, panel.speed
+    for key, slider in zip(("push", "towards", "speed"), sliders, strict=True):
+        assert slider.description == SETTINGS[key].label
+        assert slider.step == SETTINGS[key].step
+    for slider, row in zip(sliders[1:], (SETTINGS["towards"], SETTINGS["speed"]), strict=True):
+        assert (slider.min, slider.max, slider.value) == (row.low, row.high, row.first)
+    shown = {slider.description for slider in sliders} | {*panel.buttons, panel.push.description}
+    assert shown == {row.label for row in SETTINGS.values() if "lesson" in row.places}
+
+
 @pytest.fixture
 def panel():
     made = Pushed(fb.load("go2"))
@@ -147,7 +159,7 @@ def panel():
 @pytest.mark.parametrize(
     ("force", "towards", "way", "words"),
     [
-        (-40.0, 90.0, (0, -1, 0), "pushed with 40 N to the right for 0.1 s"),
+        (40.0, -90.0, (0, -1, 0), "pushed with 40 N to the right for 0.1 s"),
         (30.0, 30.0, (np.sqrt(0.75), 0.5, 0), "pushed with 30 N towards 30° for 0.1 s"),
     ],
 )

@@ -3,6 +3,7 @@
 from contextlib import closing
 from dataclasses import replace
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -281,6 +282,9 @@ def test_an_ellipse_that_grows_keeps_its_phase():
         assert (session.settings.nod, session.settings.start_time) == (0.3, 2.0)
 
 
+PLACES = {"live": "live page", "playground": "playground", "lesson": "lessons"}
+
+
 def shown_control(playground: Playground, key: str, column: str = "") -> dict[str, Any]:
     """Return the command of a control; `key` is its key in the table of settings."""
     name = f"{SETTINGS[key].label} {column}".strip()
@@ -303,6 +307,22 @@ def test_controls_have_the_words_and_ranges_of_the_table_of_settings():
                 assert made["value"] == setting.first, key
                 assert (made["min"], made["max"]) == (setting.low, setting.high), key
                 assert (made["step"], made["section"]) == (setting.step, setting.section), key
+
+
+def test_the_playground_and_the_documentation_have_the_controls_of_the_table():
+    """The live page's are tested in live.test.js, those of the lessons in test_panels.py."""
+    with closing(Playground(GO2)) as playground:
+        commands = playground.view.window.scene.commands()
+    made = [name for _, kind, name in commands if kind == "set_control"]
+    docs = (Path(__file__).parents[2] / "docs" / "live.md").read_text(encoding="utf-8")
+    table = {tuple(cell.strip() for cell in row.split("|")[1:5]) for row in docs.splitlines()}
+    for key, row in SETTINGS.items():
+        in_playground = any(name.startswith(row.label) for name in made)
+        assert in_playground == ("playground" in row.places) or key == "force_error", key
+        if key != "force_error":
+            bounds = f"{row.low:g} to {row.high:g}" if row.step else ""
+            places = ", ".join(PLACES[place] for place in row.places.split())
+            assert (f"*{row.label}*", row.section, bounds, places) in table, key
 
 
 def test_sliders_show_settings_in_the_units_of_the_table():
@@ -332,7 +352,7 @@ def test_a_robot_survives_the_default_push(name):
     robot = judges.load(name)
     with closing(Playground(robot)) as playground:
         force = playground.force
-    assert force == pytest.approx(60.0 if name != "solo12" else 0.4 * robot.weight)
+    assert force == pytest.approx(SETTINGS["push"].first * robot.weight, abs=0.5)
     session = Session(robot)
     push = fb.Push([0.0, force, 0.0], start=0.1)
     record = fb.rollout(session.sim, session.controller, 1.0, [push], PERIOD)

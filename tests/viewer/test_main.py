@@ -153,7 +153,7 @@ def test_the_controls_reach_the_robot(page, playground, go2):
     eventually(page, lambda: run.status == "paused")
     run.close()  # waits for the last slice
     stopped = session.sim.time
-    control(page, "lift FL_foot", "setValue(true)")
+    control(page, "lift front left foot", "setValue(true)")
     control(page, "run", "fire()")
     eventually(page, lambda: session.sim.time > stopped and "measured/FL_foot" not in drawn())
     assert "measured/FR_foot" in drawn()

@@ -40,6 +40,7 @@ _REQUIREMENTS = (
 _IS_DRAWN = "() => window.viewer && viewer.num_messages_received > 0"
 _PREPARE_JS = """() => {
     const {animator} = viewer;
+    document.body.classList.remove("has-panel");
     const controls = "#player, #panel, #fold, #board, #tools, #legend.folded";
     for (const one of document.querySelectorAll(controls)) one.style.visibility = "hidden";
     if (!animator.duration) return 0;
@@ -107,6 +108,7 @@ def _frames(page: str, size: tuple[int, int], rate: int) -> Generator[Image, Non
             ) from None
         with browser:
             window = browser.new_page(viewport={"width": size[0], "height": size[1]})
+            window.add_init_script("window.isFilmed = true")  # sharply; see renderer.js
             window.goto(file.as_uri())
             window.wait_for_function(_IS_DRAWN, timeout=_TIMEOUT_MS)
             duration = window.evaluate(_PREPARE_JS)

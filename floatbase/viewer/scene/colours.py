@@ -91,8 +91,8 @@ BACKGROUNDS: dict[str, tuple[RGB, RGB, RGB, RGB]] = {
 
 # colour -> its shade on a dark background, for colours with too little contrast there
 DARK_SHADES = {
-    MEASURED: _rgb("#1C80C0"),
-    PLANNED: _rgb("#8CCBF2"),
+    MEASURED: _rgb("#3F9FE5"),
+    PLANNED: _rgb("#A9DBF9"),
     COM: _rgb("#CD5A9B"),
     PATCH: _rgb("#C4C9CF"),
     GREYS[0]: _rgb("#DDE3EA"),

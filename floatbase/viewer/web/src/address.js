@@ -5,6 +5,8 @@
 import {kindOf, numberOf} from "./controls.js";
 
 const DELAY = 300; // ms: browsers refuse an address that changes too often
+const EXTRAS = ["view", "pushed", "motion"]; // keys that are no controls
+const MOST = 1e4; // of a number of such a key
 const MOST_SHOWN = 40; // characters of a text in a message
 const SWITCHES = new Map([["on", true], ["off", false]]);
 
@@ -37,6 +39,13 @@ export function refusalOf(command, text) {
     "It keeps its value.";
 }
 
+// The numbers of a key that is no control; undefined for a text that is no such list.
+export function numbersOf(text, count) {
+  const numbers = text.split(",").map(numberOf);
+  const isValid = numbers.length === count && numbers.every((x) => Math.abs(x) <= MOST);
+  return isValid ? numbers : undefined;
+}
+
 export const readHash = (hash) => new Map(new URLSearchParams(hash.replace(/^#/, "")));
 export function writeHash(entries) {
   const text = String(new URLSearchParams(entries));
@@ -54,11 +63,14 @@ export function createAddress(controls, say) {
     if (value === undefined) refused.set(name, refusalOf(command, text));
     else if (text !== present([name, {command}])) controls[name].setValue(value);
   }
+  const moved = () => [...kept].filter((entry) => present(entry) !== entry[1].first)
+    .map((entry) => [entry[0], present(entry)]);
+  const addressWith = (extras) => (
+    location.pathname + location.search + writeHash([...moved(), ...extras]));
   function write() {
     timer = null;
-    const moved = [...kept].filter((entry) => present(entry) !== entry[1].first)
-      .map((entry) => [entry[0], present(entry)]);
-    history.replaceState(null, "", location.pathname + location.search + writeHash(moved));
+    const extras = [...readHash(location.hash)].filter(([key]) => EXTRAS.includes(key));
+    history.replaceState(null, "", addressWith(extras));
   }
   addEventListener("hashchange", () => {
     const wanted = readHash(location.hash);
@@ -79,5 +91,23 @@ export function createAddress(controls, say) {
       if (refused.has(name)) say([...refused.values()].join(" "));
     },
     changed() { timer ??= setTimeout(write, DELAY); },
+    // `count` numbers of a key that is no control, or undefined.
+    numbers(key, count) {
+      const text = readHash(location.hash).get(key);
+      if (text === undefined) return undefined;
+      const numbers = numbersOf(text, count);
+      if (!numbers) {
+        refused.set(key, `${key} in the address must be ${count} numbers with commas between ` +
+          `them, each at most ${MOST}, not "${text.slice(0, MOST_SHOWN)}". It is ignored.`);
+        say([...refused.values()].join(" "));
+      }
+      return numbers;
+    },
+    // An address that opens the same. extras: {key: numbers}, undefined for none.
+    link(extras) {
+      const texts = Object.entries(extras).filter(([, numbers]) => numbers)
+        .map(([key, numbers]) => [key, numbers.map((x) => Number(x.toPrecision(4))).join()]);
+      return location.origin + addressWith(texts);
+    },
   };
 }

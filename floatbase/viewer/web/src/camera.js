@@ -6,7 +6,7 @@ import {beforeRender, findNode, pathNames, three} from "./meshcat.js";
 
 const LAG = 0.3; // s, delay behind what it follows, so that it does not shake with each step
 const SLOWEST = 1000; // ms, longest time between pictures that counts: at low rates it must keep up
-const WIDE = 1.2; // width / height of a picture that fits a robot; a narrower picture is zoomed out
+const WIDE = 1.3; // width / height of a picture that fits a robot; a narrower picture is zoomed out
 const MIN_ZOOM = 0.2; // in the smallest window
 const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
 const LOW_JUMP = 0.2; // m: the camera stays down if the robot rises by less, however low it stands
@@ -51,29 +51,23 @@ export function followFraction(elapsed) {
   return 1 - Math.exp(-Math.min(elapsed, SLOWEST) / 1000 / LAG);
 }
 
-// The zoom of a picture of width × height pixels, part of which a panel covers.
-export function zoomFor({width, height, panelWidth, panelHeight}) {
-  const fits = Math.min(
-    1, (width - panelWidth) / height / WIDE, (height - panelHeight) / height,
-  );
-  return Math.max(MIN_ZOOM, fits);
-}
+// The zoom of a picture of width × height pixels.
+export const zoomFor = (width, height) =>
+  Math.max(MIN_ZOOM, Math.min(1, width / height / WIDE));
 
 export const labelScale = (zoom) => Math.min(1 / zoom, MAX_LABEL_SCALE);
 
-// panel: its width() and height() are the pixels that it takes from the picture.
-export function createCamera(viewer, panel) {
+export function createCamera(viewer) {
   const {Vector3} = three();
   // how far the camera has moved with what it follows; initial position of the scale and the lights
   const gone = new Vector3(), begin = new Vector3(), from = new Vector3();
   let path = [], ground = {planes: [{normal: [0, 1, 0], offset: 0}], boxes: []}, clock = 0;
   let isSmooth = false, isFirst = true;
-  // pixels by which the middle of the picture is left of the window's, and above it: beside the
-  // panel, and over the player, which would hide the feet
-  const aside = () => panel.width() / 2;
+  // pixels by which what the camera looks at is above the middle of the picture: the player would
+  // hide the feet, and the terms of an equation would hide the back on a phone
   const above = () => {
-    const board = panel.height() && element("board").offsetHeight; // terms, over the picture
-    return (element("player").offsetHeight + panel.height() - board) / 2;
+    const isNarrow = innerWidth < innerHeight;
+    return (element("player").offsetHeight - isNarrow * element("board").offsetHeight) / 2;
   };
 
   // Follow at a constant height above the ground, and rise with an object that flies away. Returns
@@ -111,20 +105,17 @@ export function createCamera(viewer, panel) {
   beforeRender(viewer, () => {
     const isMoving = path.length > 0 && follow();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    const zoom = zoomFor(
-      {width: w, height: h, panelWidth: panel.width(), panelHeight: panel.height()},
-    );
+    const zoom = zoomFor(w, h);
     if (zoom !== viewer.camera.zoom) {
       viewer.camera.zoom = zoom;
       viewer.camera.updateProjectionMatrix();
       scaleLabels(viewer.scene);
     }
-    if (aside() || above()) viewer.camera.setViewOffset(w, h, aside(), above(), w, h);
+    if (above()) viewer.camera.setViewOffset(w, h, 0, above(), w, h);
     else viewer.camera.clearViewOffset();
     return isMoving;
   });
   return {
-    aside,
     scaleLabels,
     look({fov, position, target}) {
       viewer.camera.fov = fov;
@@ -133,6 +124,9 @@ export function createCamera(viewer, panel) {
       gone.set(0, 0, 0);
       isFirst = true;
     },
+    // where it is and what it looks at, before it followed anything: six numbers
+    view: () => [viewer.camera.position, viewer.controls.target]
+      .flatMap((at) => at.clone().sub(gone).toArray()),
     setGround({planes, boxes}) { ground = {planes, boxes}; },
     setFollow(command) {
       path = pathNames(command.node);

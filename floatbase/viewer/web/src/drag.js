@@ -1,21 +1,24 @@
 // Push the robot by dragging it: the way over the ground gives a push, and letting go pushes.
 
-import {element} from "./dom.js";
+import {element, make} from "./dom.js";
 import {findNode, three} from "./meshcat.js";
 
 const FULL_WAY = 0.3; // times the camera's distance: a way that gives the largest force
+const CLICK = 4; // pixels: a pointer that moves less has clicked
 
-// The push that a way {x, z} means, y up; full: length of the largest push, of `most` N.
+// The push that a way {x, z} means, y up, in whole newtons; full: length of the largest push, of
+// `most` N.
 export function pushOf({x, z}, full, most) {
-  const force = most * Math.min(1, Math.hypot(x, z) / full);
+  const force = Math.round(most * Math.min(1, Math.hypot(x, z) / full));
   return {force, towards: Math.atan2(0 - z, x) * 180 / Math.PI};
 }
 
-// isWanted(event): whether a pointer that goes down on the robot drags it. most(): the largest
+// isWanted(): whether a pointer that goes down on the robot drags it. most(): the largest
 // force, N. show(push): called while it is dragged. release(push): called when it is let go; push:
 // {force, towards, at, node}, with the point that was grabbed, y up, and the meshcat node it is in.
 export function createDrag(viewer, {isWanted, most, show, release}) {
-  const canvas = viewer.renderer.domElement;
+  const canvas = viewer.renderer.domElement, newtons = make("output", {className: "newtons"});
+  document.body.append(newtons);
   let begun = null; // {at, plane, line, node, push} while the robot is dragged
 
   function rayTo({clientX, clientY}) {
@@ -30,7 +33,7 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     return robot ? rayTo(event).intersectObject(robot, true)[0] : undefined;
   }
   function begin(event) {
-    const found = isWanted(event) ? hit(event) : undefined;
+    const found = event.button === 0 && isWanted() ? hit(event) : undefined;
     if (!found) return;
     event.stopPropagation(); // the view does not turn
     event.preventDefault();
@@ -41,18 +44,27 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     viewer.scene.add(line);
     begun = {
       at, line, plane: new Plane(new Vector3(0, 1, 0), -at.y), push: null, node: found.object,
-      pointer: event.pointerId,
+      pointer: event.pointerId, from: event,
     };
   }
   function move(event) {
-    if (begun === null || event.pointerId !== begun.pointer) return;
+    if (begun === null) {
+      const canGrab = event.target === canvas && event.buttons === 0 && isWanted();
+      canvas.style.cursor = canGrab && hit(event) ? "grab" : "";
+      return;
+    }
+    if (event.pointerId !== begun.pointer) return;
     event.stopPropagation();
+    const {clientX: x, clientY: y} = begun.from;
+    if (!begun.push && Math.hypot(event.clientX - x, event.clientY - y) < CLICK) return;
     const {Vector3} = three(), end = rayTo(event).ray.intersectPlane(begun.plane, new Vector3());
     if (end === null) return; // above the horizon
     const full = FULL_WAY * viewer.camera.position.distanceTo(begun.at);
     const {at, node} = begun;
     begun.push = {...pushOf(end.clone().sub(at), full, most()), at, node};
     show(begun.push);
+    newtons.textContent = `${begun.push.force} N`;
+    placeLabel(newtons, viewer, at);
     const ends = [at, end].map((point) => viewer.scene.worldToLocal(point.clone()));
     begun.line.geometry.setFromPoints(ends);
     viewer.set_dirty();
@@ -62,23 +74,35 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     viewer.scene.remove(begun.line);
     viewer.set_dirty();
     begun = null;
+    newtons.textContent = "";
     release(push);
   }
   element("meshcat-pane").addEventListener("pointerdown", begin, {capture: true});
   addEventListener("pointermove", move, {capture: true});
   addEventListener("pointerup", () => finish(begun && begun.push), {capture: true});
   addEventListener("pointercancel", () => finish(null), {capture: true});
-  return {hit};
+  canvas.addEventListener("touchstart", (event) => { // a finger on the robot scrolls no page
+    if (begun !== null) event.preventDefault();
+  }, {passive: false});
+}
+
+// A label beside a point of the scene, inside the picture.
+function placeLabel(label, {renderer, camera}, point) {
+  const {clientWidth: w, clientHeight: h} = renderer.domElement;
+  const at = point.clone().project(camera);
+  const right = Math.min((at.x + 1) / 2 * w + 12, w - label.offsetWidth - 4);
+  label.style.left = `${right}px`;
+  label.style.top = `${Math.max(4, (1 - at.y) / 2 * h - 28)}px`;
 }
 
 const FORCE = "push [N]", DIRECTION = "towards [°]";
 
-// With the Shift key held, dragging sets the sliders "push [N]" and "towards [°]", visible or
-// hidden, where a page has them. controls: those of the panel.
+// Dragging the robot sets the sliders "push [N]" and "towards [°]", visible or hidden, where a page
+// has them. Elsewhere it turns the view. controls: those of the panel.
 export const sliderDrag = (controls) => ({
-  isWanted: ({shiftKey, button}) =>
-    shiftKey && button === 0 && Boolean(controls[FORCE] && controls[DIRECTION]),
+  isWanted: () => Boolean(controls[FORCE] && controls[DIRECTION]),
   most: () => controls[FORCE].getMax(),
+  now: () => [controls[FORCE].getValue(), controls[DIRECTION].getValue()],
   show({force, towards}) {
     controls[FORCE].show(force);
     controls[DIRECTION].show(towards);

@@ -33,6 +33,7 @@ class FloatbaseRobot extends HTMLElement {
     if (style.position === "static") this.style.position = "relative";
     if (this.offsetHeight < 40) this.style.height = "420px";
     this.frame = document.createElement("iframe");
+    this.frame.allow = "clipboard-write"; // for its button "copy address"
     this.frame.title = `live robot ${this.getAttribute("name") ?? "go2"}: drag it to push it`;
     this.frame.style.cssText = "position:absolute;inset:0;width:100%;height:100%;border:0;" +
       `border-radius:6px;${hasFallback ? "opacity:0;pointer-events:none" : ""}`;

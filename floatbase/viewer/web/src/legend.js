@@ -7,10 +7,10 @@ import {element, make} from "./dom.js";
 const LINGER = 1000; // ms before entries disappear: a force that comes and goes makes no flicker
 
 // Whether an open legend would be in the way. All in pixels: lines: the box of the open legend;
-// player: that of the player, null without one; titleBottom: lower edge of the title; aside: by how
-// much the middle of the picture is left of the window's; width, height: of the window.
-export function isCrowded({lines, player, titleBottom, aside, width, height}) {
-  const middle = {x: width / 2 - aside, y: height / 2};
+// player: that of the player, null without one; titleBottom: lower edge of the title; width,
+// height: of the picture.
+export function isCrowded({lines, player, titleBottom, width, height}) {
+  const middle = {x: width / 2, y: height / 2};
   const away = Math.hypot(
     Math.max(middle.x - lines.right, 0), Math.max(lines.top - middle.y, 0),
   );
@@ -33,8 +33,7 @@ export function shadedItems(items, shade) {
   return {shaded, colours: [...new Set(shaded.map(([colour]) => colour))]};
 }
 
-// camera: its aside() is as above.
-export function createLegend(camera, shade) {
+export function createLegend(shade) {
   const legend = element("legend"), lines = element("lines");
   const button = legend.querySelector("button");
   const box = (id) => element(id).getBoundingClientRect();
@@ -49,7 +48,7 @@ export function createLegend(camera, shade) {
     const player = box("player").width > 0 ? box("player") : null;
     const crowded = isCrowded({
       lines: box("lines"), player, titleBottom: box("title").bottom,
-      aside: camera.aside(), width: innerWidth, height: innerHeight,
+      width: element("meshcat-pane").clientWidth, height: element("meshcat-pane").clientHeight,
     });
     legend.classList.toggle("folded", crowded && lines.childElementCount > 0);
     const covers = player !== null && button.getBoundingClientRect().right > player.left;

@@ -5,6 +5,11 @@
 
 export const three = () => MeshCat.THREE;
 
+const UNSEEN = 5e-5; // m
+
+// commands that change the page and not its picture
+const UNDRAWN = new Set(["set_title", "set_text", "add_plot_point", "set_control_value"]);
+
 export const pathNames = (path) => path.split("/").filter((name) => name);
 
 // Run meshcat's script if the page does not load it itself.
@@ -21,9 +26,12 @@ export function detachGifWorker() {
   window.onmessage = null;
 }
 
-// meshcat's viewer in an element. Throws an error if the browser has no WebGL.
-export function createViewer(pane) {
-  const viewer = new MeshCat.Viewer(pane);
+// meshcat's viewer in an element, with a renderer that draws there.
+export function createViewer(pane, renderer) {
+  const viewer = new MeshCat.Viewer(pane, true, renderer);
+  // Why: meshcat takes the height of the window, but a panel may be below the picture
+  const resize = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => resize(pane.clientWidth, pane.clientHeight);
   // meshcat lists all objects there; the page has a panel and a menu of its own
   viewer.gui.domElement.style.display = "none";
   return viewer;
@@ -45,10 +53,24 @@ export function beforeRender(viewer, hook) {
 // Why: meshcat ignores types that it does not know, and a theme recolours what a command makes.
 export function interceptCommands(viewer, handlers, after) {
   const meshcat = viewer.handle_command.bind(viewer);
+  const isUnseen = createUnseen();
   viewer.handle_command = (command) => {
+    if (isUnseen(command)) return;
     (handlers[command.type] ?? meshcat)(command, meshcat);
     after(command, command.type === "set_object" ? drawnObject(viewer, command.path) : undefined);
-    viewer.set_dirty();
+    if (!UNDRAWN.has(command.type)) viewer.set_dirty();
+  };
+}
+
+// Whether a command moves an item by so little that nobody sees it, as of a robot that stands.
+export function createUnseen() {
+  const placed = new Map(); // path -> matrix
+  return ({type, path, matrix}) => {
+    if (type === "delete" || type === "set_animation") placed.clear(); // or moved by others
+    if (type !== "set_transform") return false;
+    const isSame = placed.get(path)?.every((x, i) => Math.abs(x - matrix[i]) < UNSEEN) ?? false;
+    if (!isSame) placed.set(path, matrix);
+    return isSame;
   };
 }
 

@@ -27,7 +27,14 @@ function live(config) {
     const socket = new WebSocket(`${scheme}://${location.host}/socket`);
     socket.binaryType = "arraybuffer";
     const receive = receiver(scene, (text) => socket.send(text));
-    socket.onmessage = ({data}) => receive(data);
+    let isFirst = true;
+    socket.onmessage = ({data}) => {
+      receive(data);
+      if (!isFirst) return;
+      isFirst = false;
+      scene.lookAsAddressed();
+      scene.pushAsAddressed();
+    };
     socket.onclose = () => {
       element("notice").style.display = "block";
       comeBack();

@@ -8,16 +8,16 @@ import {createPlot} from "./plot.js";
 const COLUMNS = ["", "model", "reality"];
 const COPIED_FOR = 2000; // ms
 
-// report(message): sends a message to the window. redraw(): redraws the picture.
-export function createPanel({report: send, redraw}) {
+// send(message): sends a message to the window.
+export function createPanel(send) {
   const {report, isNews} = createReports(send);
   const root = element("panel"), foldButton = element("fold"), sections = new Map();
   const controls = Object.create(null); // without predefined names, not even "constructor"
-  foldButton.onclick = () => {
-    const closed = document.body.classList.toggle("folded-panel");
-    foldButton.setAttribute("aria-expanded", !closed);
-    redraw();
-  };
+  function fold(isFolded) {
+    document.body.classList.toggle("folded-panel", isFolded);
+    foldButton.setAttribute("aria-expanded", !isFolded);
+  }
+  foldButton.onclick = () => fold(!document.body.classList.contains("folded-panel"));
 
   const head = make("div", {className: "head"}); // stays visible when the panel is scrolled
   root.append(head);
@@ -28,7 +28,6 @@ export function createPanel({report: send, redraw}) {
     controls.undo.fire();
   });
 
-  const isBelow = () => root.offsetWidth >= innerWidth;
   function section(name = "") {
     if (!sections.has(name)) {
       const made = name ? make("details", {}, make("summary", {textContent: name})) : make("div");
@@ -151,9 +150,7 @@ export function createPanel({report: send, redraw}) {
 
   return {
     controls,
-    // pixels that it takes from the picture: on a phone it is below, else at the right
-    width: () => isBelow() ? 0 : root.offsetWidth,
-    height: () => isBelow() ? root.offsetHeight : 0,
+    fold,
     addControl(command) {
       const old = controls[command.name]; // exists when a cell is run again
       if (!old) controls[command.name] = kinds[kindOf(command)](command);
@@ -175,10 +172,7 @@ export function createPanel({report: send, redraw}) {
       }
       if (line.textContent !== text) line.textContent = text;
     },
-    addPoint: createPlot((...elements) => {
-      section();
-      head.prepend(...elements);
-    }),
+    addPoint: createPlot((...elements) => section().append(...elements)),
   };
 }
 

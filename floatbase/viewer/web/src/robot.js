@@ -2,15 +2,16 @@
 // a worker, see engine/worker.js; this page draws them with the viewer's scene, player and legend.
 //
 // config: as for the viewer, with `robots`, the names to choose from. The address may have
-// ?name=…&mu=…&push=…&gait=…&panel=0. Values that make no sense are refused in words, and count as
-// not given.
+// ?name=…&mu=…&push=…&gait=…&panel=0, and after # the settings, the view and a push, see address.js
+// and docs/embed.md. Values that make no sense are refused in words, and count as not given.
 
 import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
 import {readAddress} from "./live/attributes.js";
-import {controlsOf} from "./live/controls.js";
+import {controlsOf, labelOf} from "./live/controls.js";
+import {createHint, triesOf} from "./live/hints.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
@@ -21,8 +22,6 @@ import {startWhenSeen, watchSight} from "./visibility.js";
 
 const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
-const DEFAULT_PUSH = 0.25; // times the weight
-const STEPS_BY = 5; // N, of a push that is dragged
 const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
@@ -31,6 +30,10 @@ const EXPLAINED = { // texts of the panel's sections
   "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
     "that term in the controller's model or in reality.",
 };
+const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playground, " +
+  "`floatbase view talos`.";
+const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
+const PUSHED_AFTER = 1; // s: when the push in an address acts
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -71,17 +74,24 @@ async function start(scene, worker, {config, given, name, sight}) {
   }
 }
 
-function live(scene, worker, send, {drawing, settings, robot}, {config, given, name, sight}) {
-  const {low, high} = rangeOf("push", robot);
-  const force = given.read("push", numberRule(low, high), numberOf)
-    ?? 5 * Math.round(DEFAULT_PUSH * robot.weight / 5);
-  const push = {force, towards: 90, duration: rows.duration.first};
+function live(scene, worker, post, {drawing, settings, robot}, {config, given, name, sight}) {
+  let isStale = true; // whether the robot may differ from its picture while it is paused
+  let pushed = null; // the last push, as the worker gets it
+  const send = (message) => {
+    isStale = true;
+    if (message.push) {
+      hasPushed();
+      pushed = message.push;
+    }
+    post(message);
+  };
+  const {low, high, first} = rangeOf("push", robot);
+  const force = given.read("push", numberRule(low, high), numberOf) ?? first;
+  const push = {force, towards: rows.towards.first, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
     scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
   });
-  const newtons = make("output", {className: "newtons"});
-  document.body.append(newtons);
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
@@ -98,79 +108,84 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     send({set: {gait, lifted: null}});
     if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
   }
-  const first = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
-  const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    names: config.robots, name, walk,
+  const firstGait = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
+  const shove = () => ({push: {force: vector(push), duration: push.duration}});
+  const pause = (isNow) => {
+    isPaused = isNow;
+    return {pause: isNow};
+  };
+  const controls = controlsOf(robot, {...settings, gait: firstGait}, push, {
+    names: config.robots, name, walk, shove,
     open(other) {
       given.texts.set("name", other);
       location.search = given.texts;
     },
   });
   const changes = new Map(controls.map(({command, change}) => [command.name, change]));
+  const hasPushed = createHint(hasPanel ? triesOf(robot) : []);
   const buttons = {
-    push: () => ({push: {force: vector(push), duration: push.duration}}),
-    "stand up": () => ({reset: true}),
-    pause() {
-      isPaused = !isPaused;
-      return {pause: isPaused};
+    push_button: shove,
+    run: () => pause(false),
+    pause: () => pause(true),
+    step: () => ({...pause(true), step: true}),
+    reset: () => ({reset: true}),
+    reset_all() {
+      for (const {command, change} of controls.filter(({command}) => command.name !== "robot")) {
+        if (command.name !== labelOf(rows.push)) send(change(command.value) ?? {});
+        scene.handle({...command, type: "set_control_value"});
+      }
+      push.force = force;
+      return {...pause(false), reset: true};
     },
-    step() {
-      isPaused = true;
-      return {pause: true, step: true};
-    },
-    "push-recovery map"() {
+    map() {
+      if (frame === null) return;
       const {settings: present, com} = frame;
       drawMap({...present, lifted: null, gait: null}, com);
     },
   };
+  const presses = new Map(Object.entries(buttons).map(([key, press]) => [rows[key].name, press]));
+  scene.onMessage(({name: key, value}) => { // also while the address sets the controls
+    const message = (presses.get(key) ?? changes.get(key))?.(value);
+    if (message) send(message);
+  });
   if (hasPanel) {
-    for (const key of Object.keys(buttons)) {
-      scene.handle({type: "set_control", path: "", name: key});
-    }
+    for (const name of presses.keys()) scene.handle({type: "set_control", path: "", name});
     for (const {command} of controls) scene.handle(command);
-    for (const [section, content] of Object.entries(EXPLAINED)) {
+    const explained = {...EXPLAINED};
+    if (!Object.keys(robot.gaits).length) explained[rows.gait.section] = STANDS_ONLY;
+    for (const [section, content] of Object.entries(explained)) {
       scene.handle({type: "set_text", path: "", name: "explained", text: content, section});
     }
   }
   else document.body.append(pushButton());
-  scene.onMessage(({name: key, value}) => {
-    if (frame === null) return;
-    const message = buttons[key] ? buttons[key]() : changes.get(key)?.(value);
-    if (message) send(message);
-  });
+  if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
 
   // Without the panel, a button pushes, also for those who use no mouse.
   function pushButton() {
     return make("button", {
       type: "button", className: "push", textContent: `push ${push.force} N`,
-      onclick: () => send(buttons.push()),
+      onclick: () => send(shove()),
     });
   }
   const tell = createVoice((text) => {
     scene.handle({type: "set_title", path: "", text});
     parent.postMessage({floatbase: "limit", text}, "*");
   });
-  const drag = createDrag(scene.viewer, {
-    isWanted: ({button}) => button === 0 && frame !== null && frame.outcome === "",
+  createDrag(scene.viewer, {
+    isWanted: () => frame !== null && frame.outcome === "",
     most: () => 2.5 * robot.weight,
     show(now) {
       dragged = grabbed(now);
-      const [x, y, z] = [now.at.x, now.at.y, now.at.z];
-      newtons.textContent = `${Math.hypot(...dragged.force).toFixed(0)} N`;
-      placeLabel(newtons, scene.viewer, {x, y, z});
+      isStale = true;
     },
     release(now) {
-      newtons.textContent = "";
       dragged = null;
       if (now === null) return;
       const {body, at, force: pushed} = grabbed(now);
       send({push: {body, at, force: pushed, duration: push.duration}});
       parent.postMessage({floatbase: "push", force: pushed}, "*");
     },
-  });
-  scene.viewer.renderer.domElement.addEventListener("pointermove", (event) => {
-    scene.viewer.renderer.domElement.style.cursor = drag.hit(event) ? "grab" : "";
   });
   const joints = drawing.links.map(([joint, item]) => [joint, ["meshcat", ...item.split("/")]]);
   // What a drag means: body and point in its frame, point in the world, and force, z up.
@@ -180,8 +195,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     const world = [x, -z, y], R = frame.rotations.subarray(9 * joint, 9 * joint + 9);
     const away = world.map((c, i) => c - frame.positions[3 * joint + i]);
     const at = [0, 1, 2].map((c) => R[c] * away[0] + R[3 + c] * away[1] + R[6 + c] * away[2]);
-    const rounded = STEPS_BY * Math.round(size / STEPS_BY);
-    return {body: robot.bodies[joint], joint, at, world, force: vector({force: rounded, towards})};
+    return {body: robot.bodies[joint], joint, at, world, force: vector({force: size, towards})};
   }
 
   function draw(next) {
@@ -194,7 +208,6 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     tell(limitOf(frame, robot), performance.now());
     if (frame.time < plotted) plotted = -1;
     if (hasPanel) report();
-    scene.viewer.set_dirty();
   }
   function placeOf({body, at}) {
     const joint = robot.bodies.indexOf(body), {rotations: R, positions: p} = frame;
@@ -206,18 +219,20 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     // at the first picture there are no measured forces yet
     if (frame.time >= plotted + PLOT_PERIOD && frame.time > 0) {
       plotted = frame.time;
-      const away = frame.planned.map((x, i) => x - frame.measured[i]);
-      scene.handle({type: "add_plot_point", path: "", name: "planned minus measured force",
-        unit: "N", t: frame.time, value: Math.hypot(...away)});
+      const away = frame.planned.map((x, i) => x - frame.measured[i]), {name: quantity, unit} =
+        rows.force_error;
+      const value = robot.points.reduce(
+        (sum, _, i) => sum + Math.hypot(...away.subarray(3 * i, 3 * i + 3)), 0);
+      scene.handle({type: "add_plot_point", path: "", name: quantity, unit, t: frame.time, value});
     }
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
     written = now;
     text("active", multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
-    const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
-    text("speed", frame.factor < SLOW * slow
-      ? `This computer is too slow for real time: ${frame.factor.toFixed(2)} × real time.`
+    const wanted = scene.controls[labelOf(rows.speed)].getValue();
+    text("speed", frame.factor < SLOW * wanted
+      ? `Slow motion, ${frame.factor.toFixed(2)} × real time: this computer is too slow for more.`
       : `${frame.time.toFixed(1)} s, ${frame.factor.toFixed(2)} × real time`);
   }
   function text(key, content) {
@@ -240,7 +255,22 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     tell({rank: -2, text: content, stays: REFUSAL_TIME}, performance.now());
     parent.postMessage({floatbase: "refused", text: content}, "*");
   }
-  if (first) walk(first);
+  if (firstGait) walk(firstGait);
+  // What the address has beside the controls: how the robot walks, and a push after a second. A
+  // push is the number of a joint, or -1 for the middle of the base, a point, a force, a duration.
+  scene.lookAsAddressed();
+  const motion = scene.address.numbers("motion", 2), again = scene.address.numbers("pushed", 8);
+  if (motion && gait !== null) joystick.move(...motion);
+  if (again) {
+    const [joint, x, y, z, ...rest] = again, acts = {force: rest.slice(0, 3), duration: rest[3]};
+    const at = joint < 0 ? {} : {body: robot.bodies[joint], at: [x, y, z]};
+    send({push: {...acts, ...at, start: PUSHED_AFTER}});
+  }
+  scene.onLink(() => ({
+    motion: gait === null ? undefined : joystick.at(),
+    pushed: pushed && [robot.bodies.indexOf(pushed.body), ...pushed.at ?? [0, 0, 0],
+      ...pushed.force, pushed.duration],
+  }));
   let isLive = false;
   function announce() {
     isLive = true;
@@ -255,9 +285,9 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page
   (function loop() {
     requestAnimationFrame(loop);
-    if (isWaiting || !sight()) return;
-    isWaiting = true;
-    send({frame: true});
+    if (isWaiting || !sight() || (isPaused && !isStale)) return;
+    [isWaiting, isStale] = [true, false];
+    post({frame: true});
   })();
 }
 
@@ -271,11 +301,3 @@ function isBelow(object, node) {
   for (let at = object; at && node; at = at.parent) if (at === node.object) return true;
   return false;
 }
-
-function placeLabel(label, viewer, {x, y, z}) {
-  const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-  const at = viewer.camera.position.clone().set(x, y, z).project(viewer.camera);
-  label.style.left = `${(at.x + 1) / 2 * w + 12}px`;
-  label.style.top = `${(1 - at.y) / 2 * h - 28}px`;
-}
-

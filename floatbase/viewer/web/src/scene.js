@@ -10,33 +10,45 @@ import {splitFrame} from "./loader.js";
 import {createViewer, interceptCommands} from "./meshcat.js";
 import {createPanel} from "./panel.js";
 import {createPlayer} from "./player.js";
+import {adaptPixels, createRenderer} from "./renderer.js";
+import {createShare} from "./share.js";
 import {createTheme} from "./theme.js";
+
+const PUSHED_AFTER = 1000; // ms until the push of an address
 
 // config: {mode, backgrounds, shades}, see page.js and theme.js. Throws an error if the browser has
 // no WebGL.
 export function createScene(config) {
-  const viewer = createViewer(element("meshcat-pane"));
+  const pane = element("meshcat-pane"), {renderer, isCheap} = createRenderer(pane);
+  const viewer = createViewer(pane, renderer);
+  adaptPixels(viewer, isCheap);
   let send = () => {};
   const player = createPlayer(viewer);
-  const panel = createPanel({
-    report(message) {
-      send(message);
-      address?.changed();
-    },
-    redraw: () => viewer.set_dirty(),
+  let moreOfAddress = () => ({}); // {key: numbers} of what a page knows beside its controls
+  const panel = createPanel((message) => {
+    if (config.mode === "live" && sliders.isWanted() && message.name.startsWith("push")) {
+      moreOfAddress = () => ({pushed: sliders.now()});
+    }
+    send(message);
+    address?.changed();
   });
-  const address = config.mode === "live" ? createAddress(panel.controls, (text) => {
+  const sliders = sliderDrag(panel.controls);
+  const hasAddress = config.mode === "live" || config.mode === "robot";
+  const address = hasAddress ? createAddress(panel.controls, (text) => {
     panel.setText({name: "address", text});
   }) : null;
-  const camera = createCamera(viewer, panel);
+  const camera = createCamera(viewer);
   const theme = createTheme(viewer, config);
-  const legend = createLegend(camera, theme.colour);
+  const legend = createLegend(theme.colour);
   theme.onChange(legend.redraw);
   const interaction = createInteraction(viewer, camera);
-  if (config.mode !== "robot") createDrag(viewer, sliderDrag(panel.controls));
+  if (config.mode !== "robot") createDrag(viewer, sliders);
+  createShare(viewer, hasAddress
+    ? () => address.link({view: camera.view(), ...moreOfAddress()}) : null);
   new ResizeObserver(([{target}]) => {
     element("board").style.top = `${target.offsetTop + target.offsetHeight + 6}px`;
   }).observe(element("title"));
+  new ResizeObserver(() => viewer.set_3d_pane_size()).observe(pane); // the panel takes its room
   const handlers = {
     set_camera: camera.look,
     set_follow: camera.setFollow,
@@ -72,6 +84,7 @@ export function createScene(config) {
   return {
     viewer,
     controls: panel.controls,
+    foldPanel: panel.fold,
     // Draw a frame. A command that fails is reported; the others are still executed.
     apply(frame) {
       for (const command of splitFrame(frame)) {
@@ -82,6 +95,20 @@ export function createScene(config) {
         }
       }
       viewer.num_messages_received++;
+    },
+    address,
+    // Set the function that returns what an address has beside the controls and the view.
+    onLink(call) { moreOfAddress = call; },
+    // Look as the address says, if it does.
+    lookAsAddressed() {
+      const [x, y, z, ...target] = address.numbers("view", 6) ?? [];
+      if (x !== undefined) camera.look({fov: viewer.camera.fov, position: [x, y, z], target});
+    },
+    // Push by the sliders as the address says, if it does.
+    pushAsAddressed() {
+      const [force, towards] = address.numbers("pushed", 2) ?? [];
+      if (force === undefined || !sliders.isWanted()) return;
+      setTimeout(() => sliders.release({force, towards}), PUSHED_AFTER);
     },
     handle: (command) => viewer.handle_command(command),
     fit: () => viewer.set_3d_pane_size(),

@@ -1,6 +1,8 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import {isKept, readHash, refusalOf, textOf, valueOf, writeHash} from "../src/address.js";
+import {
+  isKept, numbersOf, readHash, refusalOf, textOf, valueOf, writeHash,
+} from "../src/address.js";
 
 const gait = {name: "gait", value: 0, choices: ["stand", "trot"], section: "walking"};
 const facets = {name: "facets", value: 4, min: 3, max: 16, section: "quadratic program"};
@@ -36,4 +38,11 @@ test("controls at the top of the panel and buttons are not in the address", () =
   assert.ok(!isKept({name: "push [N]", value: 1, min: 0, max: 9, on_release: true}));
   assert.ok(!isKept({name: "challenge", value: 0, choices: ["a"], section: ""}));
   assert.ok(!isKept({name: "b", section: "stance"}));
+});
+
+test("a view or a push in the address is a list of numbers, or nothing", () => {
+  assert.deepEqual(numbersOf("1,-2.5, 3e1", 3), [1, -2.5, 30]);
+  for (const text of ["", "1,2", "1,2,3,4", "1,2,x", "1,2,Infinity", "1,2,1e9", "1;2;3", "1,,2"]) {
+    assert.equal(numbersOf(text, 3), undefined, text);
+  }
 });

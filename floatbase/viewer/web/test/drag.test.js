@@ -8,3 +8,7 @@ test("a way of the pointer is a push in its direction, and no larger than the la
   assert.equal(left.force, 300);
   assert.ok(Math.abs(left.towards - 90) < 1e-12);
 });
+
+test("a push has whole newtons, as the slider of a push has", () => {
+  assert.equal(pushOf({x: 0.1234, z: 0}, 1, 60).force, 7);
+});

@@ -4,7 +4,7 @@ import {isCrowded, isFewer, shadedItems} from "../src/legend.js";
 
 // a legend 220 pixels wide and 100 high at the lower left
 const crowded = (width, height, more = {}) => isCrowded({
-  lines: {right: 220, top: height - 100, bottom: height}, player: null, titleBottom: 30, aside: 0,
+  lines: {right: 220, top: height - 100, bottom: height}, player: null, titleBottom: 30,
   width, height, ...more,
 });
 
@@ -21,8 +21,7 @@ test("a legend is folded where it would cover it, or the title", () => {
   assert.ok(crowded(1000, 480, {titleBottom: 400}));
 });
 
-test("a panel and a player take room from a legend", () => {
-  assert.ok(crowded(1000, 480, {aside: 170}));
+test("a player takes room from a legend", () => {
   assert.ok(crowded(1300, 600, {player: {left: 200}}));
   assert.ok(!crowded(1300, 600, {player: {left: 400}}));
 });

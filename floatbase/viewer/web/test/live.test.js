@@ -22,6 +22,18 @@ test("a clock gives the steps of the time that has passed, in slow motion too", 
   assert.equal(clock.steps(1032), 4);
 });
 
+test("with slow pictures the clock slows down, so that a push of 0.1 s is seen in several", () => {
+  const clock = createClock(1e-3);
+  clock.steps(0);
+  assert.equal(clock.steps(100), 100);
+  assert.equal(clock.steps(400), 100);
+  let pictures = 0;
+  for (let gone = 0, now = 400; gone < 100; pictures++) gone += clock.steps(now += 250, true);
+  assert.ok(pictures >= 3);
+  clock.done(30, 1);
+  assert.ok(clock.factor < 1);
+});
+
 test("a paused clock gives single steps only", () => {
   const clock = createClock(1e-3);
   clock.steps(0);
@@ -101,11 +113,11 @@ test("the sentence names what limits the robot, the most important first", () =>
   assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
   assert.match(text({outcome: "fell"}), /^The robot fell/);
   assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
-  assert.match(text({outcome: "infeasible"}), /all the constraints/);
+  assert.match(text({outcome: "infeasible"}), /all its limits/);
 });
 
 test("parts have names that a reader knows", () => {
-  assert.equal(footName("HR_FOOT"), "hind right foot");
+  assert.equal(footName("HR_FOOT"), "rear right foot");
   assert.equal(footName("left_sole_link corner 1"), "left foot");
   assert.equal(jointName("RL_thigh_joint"), "rear left thigh joint");
 });
@@ -135,9 +147,8 @@ test("controls begin at the settings of the engine and change what they name", (
   const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
   const chosen = [];
   const made = Object.fromEntries(controlsOf({...data, points, lifted: points.slice(0, 1)},
-    settings, push, {names: ["go2"], name: "go2", open() {}, walk: (gait) => {
-      chosen.push(gait);
-    }}).map((control) => [control.command.name, control]));
+    settings, push, {names: ["go2"], name: "go2", open() {}, shove: () => ({push: push.force}),
+      walk: (gait) => { chosen.push(gait); }}).map((control) => [control.command.name, control]));
   for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
     "actualHasGravity"], ["Coriolis model", "hasCoriolis"], ["Coriolis reality",
     "actualHasCoriolis"]]) {
@@ -156,8 +167,9 @@ test("controls begin at the settings of the engine and change what they name", (
     assert.deepEqual(change(min), {set: {[setting]: 0.01 * min}});
     assert.ok(min < max);
   }
-  made["push [N]"].change(55);
-  assert.equal(push.force, 55);
+  assert.deepEqual(made["push [N]"].change(55), {push: 55});
+  assert.equal(made["push [N]"].change(0), undefined);
+  assert.equal(push.force, 0);
   assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
   assert.deepEqual(made.lift.change(1), {set: {lifted: points[0]}});
   made.gait.change(1);
@@ -179,8 +191,13 @@ test("both ends of every control are valid settings, and what is beyond them is 
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
     points: ["FL_foot", "FR_foot"], gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
-    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}),
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), shove() {},
   });
+  const names = made.map(({command: {name, column = ""}}) => name.replace(column, "").trim());
+  for (const row of Object.values(rows).filter(({low, section, places}) =>
+    (low !== undefined || section) && places.includes("live"))) {
+    assert.ok(names.includes(labelOf(row)), `the page has no control ${labelOf(row)}`);
+  }
   let beyond = 0;
   for (const {command: {min, max, choices, value}, change} of made) {
     const ends = choices ? choices.map((_, i) => i) : min === undefined ? [!value] : [min, max];

@@ -1,7 +1,8 @@
 // A real-time clock for a simulation that advances only when a picture is wanted. If the machine is
 // too slow, it does not catch up: the simulation is in slow motion, and `factor` says how slow.
 
-const LONGEST = 400; // ms between two pictures that are simulated, at most
+const LONGEST = 100; // ms that the simulation advances from picture to picture, at most
+const LONGEST_PUSHED = 30; // ms, while a push acts and pictures are slower than that
 const RESTED = 2000; // ms without a picture, after which the page was not in sight
 const BUSY = 0.85; // fraction of the time between two pictures that steps may take
 const SMOOTHING = 0.05; // weight of the newest picture in `factor`
@@ -15,10 +16,11 @@ export function createClock(step) {
     setScale(value) { scale = value; },
     pause(value) { isPaused = value; },
     single() { single++; },
-    // The number of steps until `now`.
-    steps(now) {
+    // The number of steps until `now`. isPushed: whether a push acts now.
+    steps(now, isPushed = false) {
       passed = last === null || now - last > RESTED ? 0 : now - last;
-      elapsed = Math.min(LONGEST, passed);
+      const isSlow = passed > LONGEST;
+      elapsed = isSlow ? (isPushed ? LONGEST_PUSHED : LONGEST) : passed;
       last = now;
       if (isPaused) {
         const count = single;

@@ -27,7 +27,10 @@ export class Refusal extends Error {}
 // weights, the largest payload in robot masses.
 export function rangeOf(key, {weight}) {
   const {low, high, step} = rows[key];
-  if (key === "push") return {low, high: 5 * Math.ceil(high * weight / 5), step};
+  if (key === "push") {
+    const first = Math.max(step, Math.round(rows.push.first * weight));
+    return {low, high: 5 * Math.ceil(high * weight / 5), step, first};
+  }
   if (key !== "payload") return {low, high, step};
   const heaviest = Math.max(1, Math.round(high * weight / WEIGHT_PER_MASS));
   return {low, high: heaviest, step: heaviest / 20};

@@ -69,7 +69,8 @@ const summary = () => ({
 });
 
 function frame() {
-  const count = clock.steps(performance.now());
+  const isPushed = engine.pushes.some(({start: begins}) => begins <= engine.time);
+  const count = clock.steps(performance.now(), isPushed);
   const begin = performance.now();
   let done = 0;
   seen.clear();

@@ -3,7 +3,6 @@
 import {rangeOf, rows} from "../engine/settings.js";
 import {footName} from "./words.js";
 
-const SPEEDS = [1, 0.5, 0.25, 0.1];
 const TERMS = "terms of eq. (7)"; // a section
 
 // The text of a control, such as "CoM x [cm]". row: of the table of settings.
@@ -12,14 +11,15 @@ export const labelOf = ({name, symbol = "", unit = ""}) => (
 
 // The controls of a robot: [{command, change(value)}]; change returns messages for the worker:
 // {set}, {timeScale} and others. push: {force, towards, duration}, changed in place. open: called
-// with another robot's name. walk: called with the name of a gait, or null to stand.
-export function controlsOf(robot, settings, push, {names, name, open, walk}) {
+// with another robot's name. walk: called with the name of a gait, or null to stand. shove():
+// returns the message that pushes the robot.
+export function controlsOf(robot, settings, push, {names, name, open, walk, shove}) {
   const control = (label, command, change) => (
     {command: {type: "set_control", path: "", name: label, ...command}, change});
-  const slider = (key, value, change, column) => {
+  const slider = (key, value, change, column, more) => {
     const {low: min, high: max, step} = rangeOf(key, robot), {section} = rows[key];
     const label = column ? `${labelOf(rows[key])} ${column}` : labelOf(rows[key]);
-    return control(label, {value, min, max, step, section, column}, change);
+    return control(label, {value, min, max, step, section, column, ...more}, change);
   };
   const choice = (key, value, choices, change) => (
     control(labelOf(rows[key]), {value, choices, section: rows[key].section}, change));
@@ -37,12 +37,14 @@ export function controlsOf(robot, settings, push, {names, name, open, walk}) {
 
   const gaits = Object.keys(robot.gaits), feet = [...new Set(robot.points.map(footName))];
   return [
-    slider("push", push.force, (value) => { push.force = value; }),
+    slider("push", push.force, (value) => {
+      push.force = value;
+      return value > 0 ? shove() : undefined;
+    }, "", {on_release: true}),
     slider("towards", push.towards, (value) => { push.towards = value; }),
     slider("duration", push.duration, (value) => { push.duration = value; }),
-    control("speed", {value: 0, choices: SPEEDS.map((x) => `${x} ×`)}, (value) => (
-      {timeScale: SPEEDS[value]})),
-    control("robot", {value: names.indexOf(name), choices: names}, (value) => {
+    slider("speed", rows.speed.first, (value) => ({timeScale: value})),
+    control(rows.robot.name, {value: names.indexOf(name), choices: names}, (value) => {
       open(names[value]);
     }),
     ...pair("friction", "mu", "actualMu"),

@@ -2,7 +2,7 @@
 
 import {isInAir} from "../engine/contacts.js";
 
-const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "hind"};
+const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "rear"};
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
 const MOST_NAMES = 2; // in a sentence
 
@@ -38,11 +38,10 @@ function subject(names) {
 const STOPPED = {
   fell: "The robot fell. It will be back on its feet in a moment.",
   "left the ground": "The robot left the ground. It will be back on its feet in a moment.",
-  infeasible: "Too much: no motor torques can satisfy all the constraints, so the controller " +
-    "stopped. (The Python library names the conflicting constraints.) The robot will be back on " +
-    "its feet in a moment.",
-  "no answer": "The controller of this page has no answer in this state. The Python library " +
-    "has a slower method for it. The robot will be back on its feet in a moment.",
+  infeasible: "Too much: no motor torques can keep the robot within all its limits. It will be " +
+    "back on its feet in a moment.",
+  "no answer": "The controller found no solution here. The robot will be back on its feet in a " +
+    "moment.",
 };
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker

@@ -1,0 +1,138 @@
+"""Sentences about a running robot: what limits it now, as the live page says it."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from floatbase.dynamics import Contacts
+from floatbase.friction import FrictionPolyhedron
+from floatbase.playground.settings import Settings
+from floatbase.simulation import Rollout
+
+_SLIPPING, _BEYOND = 0.97, 1.02  # fractions of the actual friction limit
+_UNLOADED = 0.01  # fraction of the weight: a point with less does not stand
+_TORQUE_TOLERANCE = 1e-4  # fraction of a torque limit
+_FACET_TOLERANCE = 1e-4  # fraction of the normal force
+_MOST_NAMES = 2  # in a sentence
+
+
+def foot_name(contact: str) -> str:
+    """Return the name of a contact's foot for a reader, such as "front left foot"."""
+    if found := re.match(r"([FRH])([LR])_", contact, re.IGNORECASE):
+        return f"{_end(found[1])} {_side(found[2])} foot"
+    human = re.search("left|right", contact)
+    return f"{human[0]} foot" if human else contact
+
+
+def joint_name(joint: str) -> str:
+    """Return the name of a joint for a reader, such as "front left calf joint"."""
+    if found := re.fullmatch(r"([FRH])([LR])_(.+?)(?:_joint)?", joint):
+        return f"{_end(found[1])} {_side(found[2])} {found[3].lower()} joint"
+    return joint.replace("_", " ")
+
+
+def _end(letter: str) -> str:
+    return "front" if letter.upper() == "F" else "rear"
+
+
+def _side(letter: str) -> str:
+    return "left" if letter.upper() == "L" else "right"
+
+
+def limit_text(record: Rollout, settings: Settings) -> str:
+    """Say what limits the robot in the last row of a record.
+
+    Parameters
+    ----------
+    record : Rollout
+        Record of a run.
+    settings : Settings
+        Settings of the run.
+
+    Returns
+    -------
+    str
+        A sentence, such as "The front left foot is at its friction limit."
+    """
+    robot, contacts = record.robot, record.contacts
+    measured, planned = (forces[-1].reshape(-1, 3) for forces in (record.measured, record.planned))
+    if (
+        robot.is_floating
+        and contacts.n_points
+        and not (np.abs(measured) > _UNLOADED * robot.weight).any()
+    ):
+        return "The robot is in the air: the ground exerts no force on its feet."
+    if slipping := _slipping(contacts, measured, planned, settings, robot.weight):
+        return (
+            f"{_subject(slipping)} slipping: the ground gives less friction than the controller "
+            f"plans with."
+        )
+    largest = settings.torque_fraction * robot.torque_limits * (1.0 - _TORQUE_TOLERANCE)
+    at_limit = np.flatnonzero(np.abs(record.tau_desired[-1]) >= largest)
+    if motors := [joint_name(robot.joint_names[i]) for i in at_limit]:
+        limit = "their torque limits" if len(motors) > 1 else "its torque limit"
+        return f"{_subject(motors)} at {limit}."
+    gripping, unloaded = _friction_limits(record, settings)
+    if gripping:
+        limit = "their friction limits" if len(gripping) > 1 else "its friction limit"
+        return f"{_subject(gripping)} at {limit}."
+    if unloaded:
+        return f"{_subject(unloaded)} unloaded: a foot can push on the ground, but not pull."
+    if not robot.is_floating:
+        return "No motor is at a limit."
+    calm = "The robot walks" if settings.gait else "The robot stands"
+    return f"{calm}: no foot and no motor is at a limit."
+
+
+def _slipping(
+    contacts: Contacts,
+    measured: np.ndarray,
+    planned: np.ndarray,
+    settings: Settings,
+    weight: float,
+) -> list[str]:
+    """Return the feet at the actual friction limit whose planned force is beyond it."""
+    normal = np.array(settings.normals[1])
+    limits = []
+    for forces in (measured, planned):
+        load = forces @ normal
+        across = np.linalg.norm(forces - load[:, None] * normal, axis=1)
+        limits.append((load, across / np.maximum(settings.friction[1] * load, 1e-9)))
+    (load, actual), (planned_load, wanted) = limits
+    least = _UNLOADED * weight
+    slips = (np.minimum(load, planned_load) > least) & (actual > _SLIPPING) & (wanted > _BEYOND)
+    return _feet(contacts, slips)
+
+
+def _friction_limits(record: Rollout, settings: Settings) -> tuple[list[str], list[str]]:
+    """Return the feet whose planned force is on its polyhedron, and those that plan no force."""
+    contacts = record.contacts_at(-1)
+    names = dict.fromkeys(foot_name(name) for name in contacts.point_names)
+    gripping, unloaded = dict.fromkeys(names, False), dict.fromkeys(names, False)
+    for i, name in enumerate(contacts.names):
+        for force in record.force(name, "planned")[-1].reshape(-1, 3):
+            load = float(force @ contacts.normals[i])
+            if not np.isfinite(load):
+                continue
+            cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], settings.facets)
+            if load <= settings.min_normal_force + _UNLOADED:
+                unloaded[foot_name(name)] = True
+            elif np.max(cone.face_matrix @ force) > -_FACET_TOLERANCE * load:
+                gripping[foot_name(name)] = True
+    return [n for n in names if gripping[n]], [n for n in names if unloaded[n]]
+
+
+def _feet(contacts: Contacts, chosen: np.ndarray) -> list[str]:
+    """Return the feet of the chosen contact points."""
+    points = zip(contacts.point_names, chosen, strict=True)
+    return list(dict.fromkeys(foot_name(name) for name, is_chosen in points if is_chosen))
+
+
+def _subject(names: list[str]) -> str:
+    """Return the beginning of a sentence, such as "The front left foot is"."""
+    shown = [f"the {name}" for name in names[:_MOST_NAMES]]
+    more = len(names) - len(shown)
+    text = f"{', '.join(shown)} and {more} more" if more else " and ".join(shown)
+    return f"{text[0].upper()}{text[1:]} {'are' if len(names) > 1 else 'is'}"
