@@ -14,15 +14,18 @@ from floatbase.behaviours import Walk
 from floatbase.control import Command
 from floatbase.control.tick import tick
 from floatbase.live import robots
-from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
+from floatbase.playground import BaseMotors, ModelMismatch, PerturbedSimulation, Settings, build
 
 STATES_PER_ROBOT = 200
 RUN_TIME = 1.5  # s
 PUSH_TIME = 0.2  # s, when a push begins
-# friction coefficient, fraction of the torque limits, facets: tight friction, motors so weak that
-# most problems are infeasible, and the page's defaults
-SETTINGS = ((0.7, 1.0, 4), (0.7, 1.0, 16), (0.12, 1.0, 4), (0.3, 0.6, 8), (0.5, 0.35, 4),
-            (0.05, 0.05, 4))  # fmt: skip
+# friction coefficient, fraction of the torque limits, facets, terms of (7) that are off in the
+# model: tight friction, motors so weak that most problems are infeasible, and the page's defaults
+SETTINGS: tuple[tuple[float, float, int, tuple[str, ...]], ...] = (
+    (0.7, 1.0, 4, ()), (0.7, 1.0, 16, ()), (0.12, 1.0, 4, ()), (0.3, 0.6, 8, ()),
+    (0.5, 0.35, 4, ()), (0.05, 0.05, 4, ()), (0.7, 0.5, 4, ("cones", "drift", "velocity")),
+    (0.5, 1.0, 8, ("forces", "zeros")),
+)  # fmt: skip
 # robot, settings of the page, force of the push on the base [N] and its duration [s]
 RUNS: tuple[tuple[str, dict[str, Any], tuple[float, float, float], float], ...] = (
     ("go2", {}, (0.0, 0.0, 0.0), 0.1),
@@ -36,11 +39,22 @@ RUNS: tuple[tuple[str, dict[str, Any], tuple[float, float, float], float], ...] 
     ("go2", {}, (0.0, 300.0, 0.0), 0.2),
     ("talos", {}, (0.0, 60.0, 0.0), 0.1),
     ("solo12", {"payload": 0.5, "actualPayload": 0.5}, (5.0, 0.0, 0.0), 0.1),
-    ("go2", {"hasGravity": False}, (0.0, 30.0, 0.0), 0.1),
-    ("go2", {"actualHasGravity": False}, (0.0, 30.0, 0.0), 0.1),
-    ("go2", {"hasCoriolis": False}, (0.0, 170.0, 0.0), 0.1),
-    ("go2", {"actualHasCoriolis": False}, (0.0, 170.0, 0.0), 0.1),
-    ("go2", {"missing": ["FL_foot"]}, (0.0, 0.0, 0.0), 0.1),
+    *(
+        ("go2", {side: [term]}, (0.0, 170.0 if term in ("velocity", "drift") else 30.0, 0.0), 0.1)
+        for side, terms in (
+            ("assumedOff", ("gravity", "velocity", "zeros", "drift")),
+            ("actualOff", ("gravity", "velocity", "forces", "cones")),
+        )
+        for term in terms
+    ),
+    ("go2", {"assumedOff": ["forces"], "leg": "RR_foot"}, (0.0, 30.0, 0.0), 0.1),
+    (
+        "go2",
+        {"assumedOff": ["zeros", "gravity", "forces"], "actualOff": ["zeros"], "leg": "RL_foot"},
+        (0.0, 60.0, 0.0),
+        0.1,
+    ),
+    ("solo12", {"assumedOff": ["zeros", "velocity"], "actualOff": ["zeros"]}, (9.0, 0.0, 0.0), 0.1),
 )
 # robot, friction coefficient, and for each time [s] the page's settings from then on: gait, speed
 # [m/s], yaw rate [rad/s]; a push in between
@@ -59,14 +73,15 @@ def write(folder: Path) -> None:
         robot = fb.load(name)
         (folder / f"{name}.json").write_text(robots.robot_json(robot))
         controllers = [
-            robots.controller(robot, mu, None, facets, torque) for mu, torque, facets in SETTINGS
+            robots.controller(robot, mu, None, facets, torque, _mismatch(robot, off))
+            for mu, torque, facets, off in SETTINGS
         ]
         for i in range(STATES_PER_ROBOT):
             which = i % len(SETTINGS)
-            state = _random_state(robot, rng, violent=i % 4 == 3)
+            state = _random_state(robot, rng, violent=i % 3 == 2)
             count, arrays = _answer(controllers[which], *state)
-            mu, torque, facets = SETTINGS[which]
-            settings = {"mu": mu, "torque": torque, "facets": facets}
+            keys = ("mu", "torque", "facets", "assumedOff")
+            settings = dict(zip(keys, SETTINGS[which], strict=True))
             index.append({"robot": name, "settings": settings, "count": count,
                           "lengths": [len(array) for array in arrays]})  # fmt: skip
             numbers += arrays
@@ -79,6 +94,10 @@ def write(folder: Path) -> None:
     )
     (folder / "walks.json").write_text(json.dumps(walks))
     (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
+
+
+def _mismatch(robot: fb.Robot, off: tuple[str, ...]) -> ModelMismatch | None:
+    return build.mismatch(Settings(assumed_off=off, leg=robot.feet[0].frame))
 
 
 def _random_state(robot: fb.Robot, rng: Any, violent: bool) -> tuple[Any, Any]:
@@ -103,14 +122,11 @@ def _answer(made: fb.WholeBodyController, q: Any, v: Any) -> tuple[int, list[Any
 def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[str, Any]:
     robot = fb.load(name)
     standing = robot.standing()
-    perturbation = Perturbation(
-        gravity=given.get("actualHasGravity", True),
-        velocity_forces=given.get("actualHasCoriolis", True),
-        disabled_contacts=given.get("missing", ()),
+    leg = given.get("leg", robot.feet[0].frame)
+    settings = Settings(
+        assumed_off=given.get("assumedOff", ()), actual_off=given.get("actualOff", ()), leg=leg
     )
-    mismatch = ModelMismatch(
-        gravity=given.get("hasGravity", True), velocity_forces=given.get("hasCoriolis", True)
-    )
+    perturbation, mismatch = build.perturbation(settings, robot), build.mismatch(settings)
     mu = given.get("actualMu", robots.MU)
     sim = PerturbedSimulation(robot, mu, perturbation=perturbation)
     if "actualPayload" in given:
@@ -118,13 +134,12 @@ def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[
         mujoco.mj_setConst(sim.model, mujoco.MjData(sim.model))
     sim.reset(standing)
     assumed = _with_payload(robot, given.get("payload", 0.0))
-    made = robots.controller(
-        assumed, given.get("mu", robots.MU), modify_qp=None if mismatch.is_exact else mismatch
-    )
+    made = robots.controller(assumed, given.get("mu", robots.MU), modify_qp=mismatch)
     made = made.replace(tasks=fb.standing_tasks(standing))
     push = fb.Push(force, PUSH_TIME, duration)
     # the simulation is of the robot without its payload
-    run = fb.rollout(sim, lambda q, v, t: made(q, v, t), RUN_TIME, [push] if any(force) else [])
+    motors = BaseMotors(made, sim, mismatch) if "zeros" in settings.actual_off else made
+    run = fb.rollout(sim, lambda q, v, t: motors(q, v, t), RUN_TIME, [push] if any(force) else [])
     model = _with_payload(robot, given.get("actualPayload", 0.0)).model
     data = model.createData()
     com = [pin.centerOfMass(model, data, np.array(q)).tolist() for q in run.q]

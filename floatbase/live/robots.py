@@ -23,7 +23,7 @@ from floatbase.behaviours.walk.gait_limits import speed_fractions
 from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION, WalkingPosture
 from floatbase.behaviours.walk.stance_controllers import StanceControllers
 from floatbase.control import JointLimits, WholeBodyController
-from floatbase.control.tick import CompiledTick, dynamics, tick
+from floatbase.control.tick import CompiledTick, dynamics, problem_arrays, tick
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.live.physics import model_data
@@ -66,6 +66,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         )
     sim = Simulation(robot, MU, TIMESTEP)
     sim.reset(robot.standing())
+    feet = Contacts.feet(robot)
     return {
         "name": robot.name,
         "nq": robot.nq,
@@ -78,6 +79,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "facets": FACETS,
         "jointNames": list(robot.joint_names),
         "torqueLimits": robot.torque_limits.tolist(),
+        "legs": {name: list(feet.only(name).point_names) for name in feet.names},
         **model_data(sim),
         "problems": {
             **{
@@ -176,6 +178,17 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         "resultSize": compiled.empty_result(inputs).size,
         "k": made.contacts.k,
         "points": list(made.contacts.point_names),
+        # the integers begin with a row of 6 for each joint, then one of 9 for each contact: its
+        # seventh number says that the controller ignores the contact's force
+        "legs": {
+            name: 6 * int(sizes[problem_arrays.N_JOINTS]) + 9 * i + 6
+            for i, name in enumerate(made.contacts.names)
+        },
+        "flags": {
+            "sameRows": problem_arrays.SAME_ROWS,
+            "underactuated": problem_arrays.UNDERACTUATED,
+            "cones": problem_arrays.HAS_CONES,
+        },
         "rows": compiled.row_owners,
         "parameters": {
             "mu": _friction_places(packed_with, MU),
@@ -183,6 +196,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
             # the tables begin with `Model.terms` and the links, of which the first is the world
             "gravity": 2,
             "velocityForces": dynamics.VELOCITY_FACTOR,
+            "drift": dynamics.DRIFT_FACTOR,
             "baseMass": dynamics.N_TERMS + (dynamics.MASS + 1) + dynamics.MASS,
         },
     }

@@ -1,7 +1,8 @@
 """The settings that a learner can change in the live page and in the playground.
 
-`settings.json` has one row for each setting. Name, unit and range are the same on both pages. The
-live page contains the table (`make web`), and its engine accepts no other values.
+`settings.json` has one row for each setting, and `equation.json` one for each term of eq. (7).
+Name, unit and range are the same on both pages. The live page contains the tables (`make web`), and
+its engine accepts no other values.
 """
 
 from __future__ import annotations
@@ -10,9 +11,14 @@ import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
-_ROWS: dict[str, dict[str, Any]] = json.loads(
-    Path(__file__).with_name("settings.json").read_text(encoding="utf-8")
-)
+
+def _table(name: str) -> Any:
+    """Return a table that the live page contains, too."""
+    return json.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+
+
+_ROWS: dict[str, dict[str, Any]] = _table("settings.json")
+TERMS: list[dict[str, Any]] = _table("equation.json")  # of eq. (7)
 
 
 class Setting(NamedTuple):

@@ -199,8 +199,9 @@ const NO_SETTINGS = [
   {facets: 5}, {facets: "4"}, {facets: "length"}, {torque: 0}, {torque: 2}, {lifted: "paw"},
   {lifted: "__proto__"}, {lifted: 0}, {gait: "hop"}, {gait: "constructor"}, {gait: "__proto__"},
   {gait: "toString"}, {gait: 1}, {gait: ""}, {gait: ["trot"]}, {speed: 50}, {turn: -Infinity},
-  {hasGravity: "no"}, {hasCoriolis: 0}, {missing: null}, {missing: "FL_foot"}, {missing: ["paw"]},
-  {missing: [null]}, {mu: 0.3, gait: "hop"}, {mu: {valueOf: 5, toString: 5}},
+  {assumedOff: "no"}, {assumedOff: 0}, {actualOff: null}, {actualOff: "gravity"},
+  {assumedOff: [null]}, {assumedOff: ["inertia"]}, {actualOff: ["drift"]}, {leg: null},
+  {leg: "paw"}, {mu: 0.3, gait: "hop"}, {mu: {valueOf: 5, toString: 5}},
   {mu: Object.create(null)},
 ];
 const NO_PUSHES = [

@@ -120,7 +120,7 @@ export function createPanel({report: send, redraw}) {
 
   // A term of an equation, above the picture: its symbol shows its arrows, the two boxes switch it
   // off in the controller's model and in the simulated world.
-  function toggle({name, value: first, term, part}) {
+  function toggle({name, value: first, term, part, description = name, disabled = false}) {
     const board = element("board");
     let cell = [...board.children].find(({dataset}) => dataset.term === term);
     if (!cell) {
@@ -131,7 +131,8 @@ export function createPanel({report: send, redraw}) {
     }
     let value = first;
     const made = make("button", {
-      type: "button", className: part, textContent: part === "shown" ? term : part, title: name,
+      type: "button", className: part, textContent: part === "shown" ? term : part,
+      title: description,
     });
     const show = (now) => {
       made.setAttribute("aria-pressed", now);
@@ -141,9 +142,10 @@ export function createPanel({report: send, redraw}) {
       show(now);
       report(name, now);
     };
-    made.setAttribute("aria-label", name);
+    made.setAttribute("aria-label", description);
+    made.setAttribute("aria-disabled", disabled); // it keeps its title and the keyboard's focus
     show(value);
-    made.onclick = () => setValue(!value);
+    if (!disabled) made.onclick = () => setValue(!value);
     cell.append(made);
     return {getValue: () => value, show, setValue};
   }

@@ -28,8 +28,6 @@ const REFUSAL_TIME = 6000; // ms for which the page shows why something was refu
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
   "model and reality": "model: what the controller assumes. reality: what the robot has.",
-  "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
-    "that term in the controller's model or in reality.",
 };
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
@@ -86,21 +84,34 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
   let gait = null;
-  const joystick = createJoystick(
-    () => robot.gaits[gait]?.most ?? [0, 0], (motion) => send({set: motion}),
-  );
+  const mostOf = (name) => robot.gaits[name]?.most ?? [0, 0];
+  const joystick = createJoystick(() => mostOf(gait), (motion) => send({set: motion}));
   element("meshcat-pane").append(joystick.box);
   // Walk with a gait, forwards at first; null: stand.
   function walk(chosen) {
-    const wasStanding = gait === null;
-    gait = chosen;
+    const [x, y] = gait === null ? [0, 0.5] : joystick.at(), [fastest, sharpest] = mostOf(chosen);
+    const motion = chosen === null ? {} : {speed: y * fastest, turn: -x * sharpest};
+    const changes = {gait: chosen, lifted: null, ...motion};
+    showGait({...frame?.settings ?? settings, ...changes});
+    send({set: changes});
+  }
+  function showGait(now) {
+    ({gait} = now);
     joystick.show(gait !== null);
-    send({set: {gait, lifted: null}});
-    if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
+    joystick.put(now);
+  }
+  // Show settings that the page did not set itself.
+  function showSettings(now) {
+    for (const {command: {name: key}, shown} of controls) {
+      if (shown && hasPanel) {
+        scene.handle({type: "set_control_value", path: "", name: key, value: shown(now)});
+      }
+    }
+    showGait(now);
   }
   const first = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
   const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    names: config.robots, name, walk,
+    names: config.robots, name, walk, draw: painter.show,
     open(other) {
       given.texts.set("name", other);
       location.search = given.texts;
@@ -110,6 +121,16 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const buttons = {
     push: () => ({push: {force: vector(push), duration: push.duration}}),
     "stand up": () => ({reset: true}),
+    undo: () => ({undo: true}),
+    "reset everything"() {
+      for (const {command, change, shown} of controls) {
+        if (shown || command.name === "robot") continue;
+        change(command.value);
+        scene.handle({type: "set_control_value", path: "", name: command.name,
+          value: command.value});
+      }
+      return {resetAll: true};
+    },
     pause() {
       isPaused = !isPaused;
       return {pause: isPaused};
@@ -231,6 +252,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
       draw(data.frame);
       if (!isLive) announce();
     }
+    if (data.settings) showSettings(data.settings);
     if (data.stoodUp) tell(STOOD_UP, performance.now());
     if (data.isRefusal) refuse(data.error);
     else if (data.error) showNotice(data.error);

@@ -2,8 +2,9 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
+import {createHistory} from "../src/engine/history.js";
 import {
-  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows,
+  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows, terms,
 } from "../src/engine/settings.js";
 import {numberOf} from "../src/controls.js";
 import {readAddress} from "../src/live/attributes.js";
@@ -130,19 +131,19 @@ test("a control has its name, its symbol and its unit", () => {
 });
 
 test("controls begin at the settings of the engine and change what they name", () => {
-  const data = {weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}}, lifted: []};
-  const settings = defaults(data), push = {force: 30, towards: 90, duration: 0.1};
-  const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
-  const chosen = [];
-  const made = Object.fromEntries(controlsOf({...data, points, lifted: points.slice(0, 1)},
-    settings, push, {names: ["go2"], name: "go2", open() {}, walk: (gait) => {
-      chosen.push(gait);
-    }}).map((control) => [control.command.name, control]));
-  for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
-    "actualHasGravity"], ["Coriolis model", "hasCoriolis"], ["Coriolis reality",
-    "actualHasCoriolis"]]) {
-    assert.equal(made[name].command.value, settings[key]);
-    assert.deepEqual(made[name].change(false), {set: {[key]: false}});
+  const data = {
+    weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}},
+    legs: ["FL_foot", "RR_foot"],
+  };
+  const settings = defaults({...data, legs: {FL_foot: [], RR_foot: []}});
+  const push = {force: 30, towards: 90, duration: 0.1};
+  const chosen = [], drawn = [];
+  const made = Object.fromEntries(controlsOf({...data, lifted: ["FL_foot"]}, settings, push, {
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => { chosen.push(gait); },
+    draw: (...term) => { drawn.push(term); },
+  }).map((control) => [control.command.name, control]));
+  for (const {command, shown} of Object.values(made)) {
+    if (shown) assert.equal(command.value, shown(settings));
   }
   for (const [name, setting] of [["friction μ model", "mu"], ["friction μ reality", "actualMu"],
     ["payload [kg] model", "payload"], ["gravity g [m/s²]", "gravity"]]) {
@@ -159,27 +160,65 @@ test("controls begin at the settings of the engine and change what they name", (
   made["push [N]"].change(55);
   assert.equal(push.force, 55);
   assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
-  assert.deepEqual(made.lift.change(1), {set: {lifted: points[0]}});
+  assert.deepEqual(made.lift.change(1), {set: {lifted: "FL_foot"}});
   made.gait.change(1);
   made.gait.change(0);
   assert.deepEqual(chosen, ["trot", null]);
-  const missing = made["foot without ground"];
-  assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
-  assert.deepEqual(missing.change(0), {set: {missing: []}});
+  assert.deepEqual(made["leg of Jᵀλ"].change(1), {set: {leg: "RR_foot"}});
+  made["show gravity"].change(true);
+  assert.deepEqual(drawn, [["gravity", true]]);
+});
+
+test("the board has every term, and a switch keeps the other terms of its side", () => {
+  const page = {
+    weight: 100, facets: [4], gaits: {}, lifted: [], legs: ["FL_foot"],
+  };
+  const settings = defaults({mu: 0.7, gravity: 9.81, facets: [4], legs: {FL_foot: []}});
+  const calls = {names: [], name: "", open() {}, walk() {}, draw() {}};
+  const made = controlsOf(page, settings, {}, calls).filter(({command}) => command.term);
+  const control = (name) => made.find(({command}) => command.name === name);
+  for (const term of terms) {
+    const parts = made.filter(({command}) => command.term === term.symbol)
+      .map(({command}) => command.part);
+    const expected = ["shown", ...(term.assumed_switch ? ["model"] : []),
+      ...(term.actual_switch ? ["reality"] : [])];
+    assert.deepEqual(parts, expected);
+  }
+  const inModel = control("gravity in the model");
+  assert.deepEqual(inModel.change(false), {set: {assumedOff: ["gravity"]}});
+  assert.deepEqual(control("drift of the contacts in the model").change(false),
+    {set: {assumedOff: ["gravity", "drift"]}});
+  assert.equal(inModel.shown({...settings, assumedOff: ["cones"]}), true); // after "undo"
+  assert.deepEqual(inModel.change(false), {set: {assumedOff: ["cones", "gravity"]}});
+  assert.deepEqual(control("gravity in reality").change(false), {set: {actualOff: ["gravity"]}});
+  assert.match(control("show zeros").command.description, /playground/);
+  assert.ok(control("show zeros").command.disabled && !control("show gravity").command.disabled);
+});
+
+test("undo restores the settings before a change, and a moving slider is one change", () => {
+  const history = createHistory();
+  history.remember({mu: 1}, {mu: 2}, 0);
+  history.remember({mu: 2}, {mu: 3}, 500);
+  history.remember({mu: 3}, {torque: 0.5}, 600);
+  history.remember({mu: 3, torque: 0.5}, {torque: 0.5}, 5000); // changes nothing
+  assert.deepEqual(history.undo({mu: 3, torque: 0.5}), {mu: 3});
+  assert.deepEqual(history.undo({mu: 3}), {mu: 1});
+  assert.equal(history.undo({mu: 1}), null);
 });
 
 const go2 = {
   weight: 150, points: [{name: "FL_foot"}, {name: "FR_foot"}], facets: [4, 8], bodies: [0, 1, 2],
   problems: {"all/4": {lifted: null}, "FL_foot/4": {lifted: "FL_foot"}},
   walking: {gaits: {trot: {most: [0.6, 0.8]}, walk: {most: [0.2, 0.15]}}}, mu: 0.7, gravity: 9.81,
+  legs: {FL_foot: ["FL_foot"], FR_foot: ["FR_foot"]},
 };
 
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
-    points: ["FL_foot", "FR_foot"], gaits: go2.walking.gaits};
+    legs: Object.keys(go2.legs), gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
-    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}),
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), draw() {},
   });
   let beyond = 0;
   for (const {command: {min, max, choices, value}, change} of made) {

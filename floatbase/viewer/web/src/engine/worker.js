@@ -2,20 +2,26 @@
 // a picture. A page that draws nothing lets the robot rest.
 //
 // From the page: {start}, {set}, {push}, {reset}, {pause}, {step}, {timeScale}, {frame},
-// {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp}, {recovery}, {error}. An error with
+// {recovery}, {stop}, {undo}, {resetAll}; to the page: {ready}, {frame}, {stoodUp}, {settings},
+// {recovery}, {error}. {settings} are those that the page did not set itself. An error with
 // `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {createEngine, STEP} from "./engine.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
+import {createHistory} from "./history.js";
 import {pushRecovery} from "./recovery.js";
-import {Refusal, SWITCH, check, checkNames, liftedFeet, numberRule} from "./settings.js";
+import {
+  Refusal, SWITCH, check, checkNames, defaults, liftedFeet, numberRule,
+} from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
 let resting = []; // joints that are at the end of their range when the robot stands
 let around = null; // names of the contact points, and the weight
-const clock = createClock(STEP);
+const clock = createClock(STEP), history = createHistory();
+let first = null; // the settings of "reset everything"
+let velocity = null; // of the centre of mass at the last picture: {time, value}
 // constraints that were active, and contact points that slipped, since the last picture
 const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
@@ -53,9 +59,9 @@ async function start({name, settings}) {
     }
   }
   resting = [...standing];
-  engine.set(settings);
-  engine.reset();
-  slipTime = null;
+  first = {...defaults(robot), ...settings};
+  restart(first);
+  history.clear();
   clock.reset();
   const {drawing, weight} = robot;
   around = {weight, points: robot.points.map(({name}) => name)};
@@ -65,8 +71,19 @@ async function start({name, settings}) {
 const summary = () => ({
   ...around, bodies: robot.bodies,
   facets: robot.facets, lifted: liftedFeet(robot),
-  gaits: robot.walking?.gaits ?? {}, resting,
+  gaits: robot.walking?.gaits ?? {}, legs: Object.keys(robot.legs), resting,
 });
+
+function restart(settings = {}) {
+  engine.set(settings);
+  engine.reset();
+  slipTime = null;
+}
+function change(settings) {
+  const before = engine.settings;
+  engine.set(settings);
+  history.remember(before, settings, performance.now());
+}
 
 function frame() {
   const count = clock.steps(performance.now());
@@ -76,8 +93,7 @@ function frame() {
   slipping.clear();
   for (; done < count; done++) {
     if (engine.isAtRest) {
-      engine.reset();
-      slipTime = null;
+      restart();
       postMessage({stoodUp: true});
     }
     engine.step();
@@ -104,6 +120,27 @@ function watchSlip() {
   else if (engine.time - slipTime > RECENT) slipTime = null;
 }
 
+// The forces that are drawn for terms of eq. (7), N: {term: {at, force}}.
+function termForces() {
+  const {actualOff: off} = engine.settings, base = robot.bodies[1];
+  const {data, model} = engine.actual, mass = model.body_subtreemass[base], com = engine.com();
+  const now = {time: engine.time, value: engine.comVelocity()}, past = velocity ?? now;
+  velocity = now;
+  const weight = [0, 0, off.includes("gravity") ? 0 : -mass * engine.settings.gravity];
+  const elapsed = now.time - past.time;
+  return {
+    inertia: {at: com, force: now.value.map(
+      (x, i) => elapsed > 0 ? mass * (x - past.value[i]) / elapsed : 0,
+    )},
+    velocity: {
+      at: [...data.xpos.subarray(3 * base, 3 * base + 3)],
+      force: off.includes("velocity") ? [0, 0, 0]
+        : [...engine.actual.coriolisCompensation().subarray(0, 3)],
+    },
+    gravity: {at: com, force: weight, endsThere: true}, // the ground is below it
+  };
+}
+
 // What the page draws of the present state.
 function picture() {
   const {data} = engine.actual, {bodies, points} = robot;
@@ -118,7 +155,7 @@ function picture() {
     places[3 * geom], places[3 * geom + 1], places[3 * geom + 2] - radius,
   ]);
   return {
-    rotations, positions, contacts, com: engine.com(), time: engine.time,
+    rotations, positions, contacts, com: engine.com(), time: engine.time, terms: termForces(),
     measured: engine.measuredForces(), planned: engine.plannedForces(),
     active: engine.activeConstraints(), seen: [...seen.values()], slipping: [...slipping],
     hasSlipped: slipTime !== null,
@@ -130,12 +167,22 @@ function picture() {
 
 const handlers = {
   start: (given) => start(given),
-  set: (changes) => engine?.set(changes),
-  push: (push) => engine?.push(push),
-  reset() {
-    engine?.reset();
-    slipTime = null;
+  set: (changes) => engine && change(changes),
+  undo() {
+    const before = engine && history.undo(engine.settings);
+    if (!before) return;
+    engine.set(before);
+    postMessage({settings: engine.settings});
   },
+  resetAll() {
+    if (!engine) return;
+    change(first);
+    restart();
+    clock.setScale(1);
+    postMessage({settings: engine.settings});
+  },
+  push: (push) => engine?.push(push),
+  reset: () => engine && restart(),
   pause(isPaused) {
     check("pause", isPaused, SWITCH);
     clock.pause(isPaused);
