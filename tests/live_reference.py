@@ -8,13 +8,24 @@ from typing import Any
 import mujoco
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.behaviours import Walk
 from floatbase.control import Command
 from floatbase.control.tick import tick
+from floatbase.friction import FrictionPolyhedron
 from floatbase.live import robots
-from floatbase.playground import BaseMotors, ModelMismatch, PerturbedSimulation, Settings, build
+from floatbase.robots import State
+from floatbase.playground import (
+    CHALLENGES,
+    PERIOD,
+    BaseMotors,
+    ModelMismatch,
+    Perturbation,
+    PerturbedSimulation,
+    Session,
+)
 
 STATES_PER_ROBOT = 200
 RUN_TIME = 1.5  # s
@@ -63,6 +74,22 @@ WALKS: tuple[tuple[str, float, dict[float, tuple[str | None, float, float]]], ..
     ("solo12", 0.7, {0.0: ("walk", *robots.MOST["walk"]), 2.3: ("walk", 0.1, 0.0)}),
 )
 WALK_TIME = 3.6  # s
+# title of a challenge, and settings of the playground or a push [N, °] for times [s] of its run;
+# each challenge of the page is solved once
+CHALLENGED: tuple[tuple[str, dict[float, dict[str, Any] | tuple[float, float]]], ...] = (
+    ("Survive 300 N", {0.0: {"steps_when_pushed": True}, 0.1: (200.0, 90.0), 0.4: (300.0, 90.0)}),
+    ("On an edge", {0.0: {"friction": (0.1, 0.7)}, 0.2: (60.0, 45.0)}),
+    ("Infeasible", {0.1: {"torque_fraction": 0.1, "min_normal_force": 60.0}}),
+    ("Infeasible", {0.1: (400.0, 90.0)}),
+    ("Quick foot", {0.2: {"lifted_feet": ("FL_foot",)}}),
+    ("Quick foot", {0.0: {"com_shift": (-0.05, -0.03, 0.0)}, 0.8: {"lifted_feet": ("FL_foot",)}}),
+    ("On ice", {0.0: {"friction": (0.05, 0.05)}, 0.2: (8.0, 0.0), 0.5: (10.0, 0.0)}),
+    ("On ice", {0.2: (14.0, 0.0)}),
+    ("The weakest side", {0.1: (190.0, 90.0)}),
+    ("The weakest side", {0.1: (240.0, 90.0)}),
+)
+JUDGED_TIME = 3.0  # s, at most
+SLICE = 9 * PERIOD  # s
 WALK_PUSH = (0.0, 0.2, 0.0), 2.0, 0.1  # force [fraction of the weight], start and duration [s]
 
 
@@ -93,11 +120,41 @@ def write(folder: Path) -> None:
         np.concatenate([each.pop("numbers") for each in walks]).tobytes()
     )
     (folder / "walks.json").write_text(json.dumps(walks))
+    (folder / "challenges.json").write_text(json.dumps([_judged(*given) for given in CHALLENGED]))
     (folder / "recovery.json").write_text(json.dumps(_recovery("solo12")))
 
 
-def _mismatch(robot: fb.Robot, off: tuple[str, ...]) -> ModelMismatch | None:
-    return build.mismatch(Settings(assumed_off=off, leg=robot.feet[0].frame))
+def conflicts(folder: Path, found: list[dict[str, Any]]) -> list[list[bool]]:
+    """For each conflict that the page found: whether its rows can hold, and without each row."""
+    index, numbers = json.loads((folder / "states.json").read_text()), np.fromfile(folder / "states.bin")
+    starts, holds = np.cumsum([0] + [sum(each["lengths"]) for each in index]), []
+    for each in found:
+        given = index[each["state"]]
+        robot, (nq, nv) = fb.load(given["robot"]), given["lengths"][:2]
+        q, v = np.split(numbers[starts[each["state"]] :][: nq + nv], [nq])
+        mu, torque, facets, off = given["settings"].values()
+        made = robots.controller(robot, mu, None, facets, torque, _mismatch(robot, off))
+        qp = made.qp(State(robot, q, v))
+        names = [(row.kind, row.owner, row.number or 0) for row in qp.inequality_names]
+        rows = [names.index(tuple(row)) for row in each["rows"]]
+        sets = [rows, *([other for other in rows if other != row] for row in rows)]
+        holds.append([
+            linprog(np.zeros(qp.A.shape[1]), qp.G[some], qp.h[some], qp.A, qp.b, (None, None)).status
+            == 0 for some in sets
+        ])  # fmt: skip
+    return holds
+
+
+def _mismatch(robot: fb.Robot, off: Any, leg: str = "") -> ModelMismatch | None:
+    mismatch = ModelMismatch(
+        gravity="gravity" not in off,
+        velocity_forces="velocity" not in off,
+        drift="drift" not in off,
+        underactuated="zeros" not in off,
+        cones="cones" not in off,
+        ignored_contacts=[leg or robot.feet[0].frame] if "forces" in off else (),
+    )
+    return None if mismatch.is_exact else mismatch
 
 
 def _random_state(robot: fb.Robot, rng: Any, violent: bool) -> tuple[Any, Any]:
@@ -122,11 +179,14 @@ def _answer(made: fb.WholeBodyController, q: Any, v: Any) -> tuple[int, list[Any
 def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[str, Any]:
     robot = fb.load(name)
     standing = robot.standing()
-    leg = given.get("leg", robot.feet[0].frame)
-    settings = Settings(
-        assumed_off=given.get("assumedOff", ()), actual_off=given.get("actualOff", ()), leg=leg
+    off = given.get("actualOff", ())
+    perturbation = Perturbation(
+        gravity="gravity" not in off,
+        velocity_forces="velocity" not in off,
+        disabled_contacts=[robot.feet[0].frame] if "forces" in off else (),
+        adhesion_force=float(round(robot.weight)) if "cones" in off else 0.0,
     )
-    perturbation, mismatch = build.perturbation(settings, robot), build.mismatch(settings)
+    mismatch = _mismatch(robot, given.get("assumedOff", ()), given.get("leg", ""))
     mu = given.get("actualMu", robots.MU)
     sim = PerturbedSimulation(robot, mu, perturbation=perturbation)
     if "actualPayload" in given:
@@ -138,7 +198,7 @@ def _run(name: str, given: dict[str, Any], force: Any, duration: float) -> dict[
     made = made.replace(tasks=fb.standing_tasks(standing))
     push = fb.Push(force, PUSH_TIME, duration)
     # the simulation is of the robot without its payload
-    motors = BaseMotors(made, sim, mismatch) if "zeros" in settings.actual_off else made
+    motors = BaseMotors(made, sim, mismatch) if "zeros" in off else made
     run = fb.rollout(sim, lambda q, v, t: motors(q, v, t), RUN_TIME, [push] if any(force) else [])
     model = _with_payload(robot, given.get("actualPayload", 0.0)).model
     data = model.createData()
@@ -191,6 +251,56 @@ def _walk(name: str, mu: float, schedule: dict[float, Any]) -> dict[str, Any]:
     return {"robot": name, "mu": mu, "schedule": settings, "outcome": run.outcome,
             "force": push.force.tolist(), "start": start, "duration": duration,
             "lengths": [len(row) for row in rows], "numbers": np.concatenate(rows)}  # fmt: skip
+
+
+def _judged(title: str, script: dict[float, Any]) -> dict[str, Any]:
+    """A run of a challenge: what its judge saw in each slice, and said."""
+    (challenge,) = [each for each in CHALLENGES if each.title == title]
+    session, judge = Session(fb.load("go2"), challenge.start), challenge.judge()
+    waiting, pushes, samples, end = list(script.items()), list[fb.Push](), list[Any](), None
+
+    def verdict() -> dict[str, Any]:
+        return {"won": judge.won, "message": judge.message}
+
+    while session.sim.time < JUDGED_TIME and not judge.won and end is None:
+        while waiting and session.sim.time >= waiting[0][0] - 1e-9:
+            act = waiting.pop(0)[1]
+            if isinstance(act, tuple):
+                pushes.append(fb.Push.horizontal(*act, session.sim.time))
+            else:
+                session.change(**act)
+        acting = [push for push in pushes if session.sim.time < push.start + push.duration]
+        record = fb.rollout(session.sim, session.controller, SLICE, acting, PERIOD)
+        if len(record):
+            session.observe(record)
+            judge.observe(record, session)
+            samples.append({"sample": _sample(record, session), "verdict": verdict()})
+        if record.outcome != "completed":
+            judge.run_ended(f"{record.outcome}: {record.error}", session)
+            outcome = "infeasible" if "conflict" in str(record.error) else record.outcome
+            end = {"outcome": outcome, "verdict": verdict()}
+    given = [
+        {"force": push.force.tolist(), "start": push.start, "duration": push.duration}
+        for push in pushes
+    ]
+    return {"title": title, "samples": samples, "pushes": given, "end": end}
+
+
+def _sample(record: fb.Rollout, session: Session) -> dict[str, Any]:
+    """What the page's judges look at, as `sampleOf` in challenges.js."""
+    sim, contacts = session.sim, record.contacts_at(-1)
+    places = sim.contact_positions()
+    heights = sim.ground.clearances(places).min(axis=1)
+    feet = []
+    for name, at, height in zip(sim.point_names, places.tolist(), heights.tolist(), strict=True):
+        stands = name in contacts.names
+        measured = record.force(name) if stands else np.zeros((1, 3))
+        planned = record.force(name, "planned") if stands else np.zeros((1, 3))
+        feet.append({"name": name, "at": at, "height": height, "stands": stands,
+                     "load": measured[-1, 2], "planned": planned[-1].tolist()})  # fmt: skip
+    facets = FrictionPolyhedron(contacts.normals[0], contacts.mus[0], session.settings.facets)
+    return {"time": float(record.time[-1]), "span": len(record) * PERIOD, "feet": feet,
+            "facets": facets.face_matrix.tolist()}  # fmt: skip
 
 
 def _recovery(name: str) -> dict[str, Any]:

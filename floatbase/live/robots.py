@@ -23,7 +23,7 @@ from floatbase.behaviours.walk.gait_limits import speed_fractions
 from floatbase.behaviours.walk.posture import MIN_SIDE_FRACTION, WalkingPosture
 from floatbase.behaviours.walk.stance_controllers import StanceControllers
 from floatbase.control import JointLimits, WholeBodyController
-from floatbase.control.tick import CompiledTick, dynamics, problem_arrays, tick
+from floatbase.control.tick import CompiledTick, dynamics, tick
 from floatbase.dynamics import Contacts, EquationsOfMotion
 from floatbase.errors import InputError
 from floatbase.live.physics import model_data
@@ -54,6 +54,7 @@ _WALK_CONSTANTS = {
     "pathShift": plan.PATH_SHIFT_THRESHOLD,
     "sideFraction": MIN_SIDE_FRACTION,
 }
+_SIZES: Any = vars(tick)["size"]  # names of the entries of the tick's `sizes`
 _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
@@ -161,6 +162,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
     compiled = _compiled(made)
     sizes, ints, floats = compiled.pack(made.problem)
     inputs = compiled.default_inputs
+    n_rows = made.limits.facets + 1  # of a cone
     n_floats, n_ints = tick.workspace_sizes(sizes, inputs.packed.size)
 
     def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
@@ -181,18 +183,23 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         # the integers begin with a row of 6 for each joint, then one of 9 for each contact: its
         # seventh number says that the controller ignores the contact's force
         "legs": {
-            name: 6 * int(sizes[problem_arrays.N_JOINTS]) + 9 * i + 6
+            name: 6 * int(sizes[_SIZES.N_JOINTS]) + 9 * i + 6
             for i, name in enumerate(made.contacts.names)
         },
         "flags": {
-            "sameRows": problem_arrays.SAME_ROWS,
-            "underactuated": problem_arrays.UNDERACTUATED,
-            "cones": problem_arrays.HAS_CONES,
+            "sameRows": _SIZES.SAME_ROWS,
+            "underactuated": _SIZES.UNDERACTUATED,
+            "cones": _SIZES.HAS_CONES,
         },
         "rows": compiled.row_owners,
         "parameters": {
             "mu": _friction_places(packed_with, MU),
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
+            # the tables end with cones, torque limits, joint limits (6, d) and three numbers
+            "cones": floats.size - 3 - 7 * made.robot.d - 5 * made.contacts.n_points * n_rows,
+            # minimum and maximum normal forces follow the targets
+            "bounds": compiled.layout.size,
+            "torqueLimits": floats.size - 3 - 7 * made.robot.d,
             # the tables begin with `Model.terms` and the links, of which the first is the world
             "gravity": 2,
             "velocityForces": dynamics.VELOCITY_FACTOR,

@@ -1,8 +1,8 @@
 """The settings that a learner can change in the live page and in the playground.
 
-`settings.json` has one row for each setting, and `equation.json` one for each term of eq. (7).
-Name, unit and range are the same on both pages. The live page contains the tables (`make web`), and
-its engine accepts no other values.
+`settings.json` has one row for each setting, `equation.json` one for each term of eq. (7), and
+`challenges.json` one for each challenge. They are the same on both pages. The live page contains
+the tables (`make web`), and its engine accepts no other values.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ def _table(name: str) -> Any:
 
 _ROWS: dict[str, dict[str, Any]] = _table("settings.json")
 TERMS: list[dict[str, Any]] = _table("equation.json")  # of eq. (7)
+CHALLENGE_TABLE: dict[str, Any] = _table("challenges.json")
 
 
 class Setting(NamedTuple):

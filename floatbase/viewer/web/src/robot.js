@@ -14,7 +14,7 @@ import {controlsOf} from "./live/controls.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
-import {createVoice, limitOf, multiplierText} from "./live/words.js";
+import {conflictLines, createVoice, limitOf, multiplierText} from "./live/words.js";
 import {unpack} from "./loader.js";
 import {detachGifWorker, findNode} from "./meshcat.js";
 import {startWhenSeen, watchSight} from "./visibility.js";
@@ -124,7 +124,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     undo: () => ({undo: true}),
     "reset everything"() {
       for (const {command, change, shown} of controls) {
-        if (shown || command.name === "robot") continue;
+        if (shown || ["robot", "challenge"].includes(command.name)) continue;
         change(command.value);
         scene.handle({type: "set_control_value", path: "", name: command.name,
           value: command.value});
@@ -234,7 +234,10 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
     written = now;
-    text("active", multiplierText(frame.active));
+    const {challenge} = frame;
+    text("challenge", challenge ? `${challenge.text}\n${challenge.message}` : "");
+    text("active", frame.conflict.length ? conflictLines(frame.conflict)
+      : multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls.speed?.getValue() ?? 0, slow = [1, 0.5, 0.25, 0.1][wanted];
     text("speed", frame.factor < SLOW * slow

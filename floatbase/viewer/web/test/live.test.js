@@ -13,7 +13,9 @@ import {controlsOf, labelOf} from "../src/live/controls.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
 import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
-import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
+import {
+  conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
+} from "../src/live/words.js";
 
 test("a clock gives the steps of the time that has passed, in slow motion too", () => {
   const clock = createClock(1e-3);
@@ -74,7 +76,7 @@ test("a force is inside its cone, outside, or nothing", () => {
 
 const robot = {points: ["FL_foot", "FR_foot"], weight: 100, resting: ["gripper_joint"]};
 const frameWith = (more) => ({
-  outcome: "", seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
+  outcome: "", conflict: [], seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
   measured: new Float64Array([0, 0, 50, 0, 0, 50]),
   planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
 });
@@ -102,7 +104,11 @@ test("the sentence names what limits the robot, the most important first", () =>
   assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
   assert.match(text({outcome: "fell"}), /^The robot fell/);
   assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
-  assert.match(text({outcome: "infeasible"}), /all the constraints/);
+  const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
+    ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
+  assert.match(text({outcome: "infeasible", conflict}),
+    /friction of the front left foot; torque limit of the rear left calf joint and rear left hip/);
+  assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .* \(facet 4\)/);
 });
 
 test("parts have names that a reader knows", () => {

@@ -6,6 +6,7 @@ import {contactForces, makeModel, touchingPoints} from "./model.js";
 import {checkPush, checkSettings, defaults} from "./settings.js";
 import {NO_ANSWER, createTick, setParameter} from "./tick.js";
 import {createWalk} from "./walk.js";
+import {frictionValue, smallestConflict} from "./what_if.js";
 
 export const STEP = 1e-3; // s
 const REST = 1.5; // s that a fallen robot lies before it is put on its feet again
@@ -27,6 +28,7 @@ export function createEngine(mj, module, robot) {
   let target = [0, 0, 0], shift = [0, 0, 0]; // m, of the centre of mass from its place at rest
   let stance = {lifted: null, since: 0, lower: 0}; // the foot that is in the air
   let walk = null, gait = null; // the plan of a walk, and the gait that it follows or null
+  let conflict = []; // constraints that cannot hold together, after the controller has stopped
   let motors = null; // wrench of the base's motors, or none
   let startHeight = 0, startAxis = [0, 0, 1], qpos = null, qvel = null, ctrl = null;
 
@@ -78,7 +80,7 @@ export function createEngine(mj, module, robot) {
     qpos.set(robot.home.qpos);
     mj.mj_forward(actual.model, actual.data);
     pushes = [];
-    [outcome, active, steps, offAt, motors] = ["", 0, 0, -1, null];
+    [outcome, active, steps, offAt, motors, conflict] = ["", 0, 0, -1, null, []];
     stance = {lifted: null, since: 0, lower: 0};
     [walk, gait] = [null, null];
     [target, shift] = [[0, 0, 0], [0, 0, 0]];
@@ -174,6 +176,7 @@ export function createEngine(mj, module, robot) {
     readAssumed();
     if (walk !== null) moveWalk(time);
     active = tick.run();
+    if (active === NO_ANSWER.infeasible) conflict = smallestConflict(tick, robot);
     if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
     for (let i = 0; i < d; i++) ctrl[robot.motors[i]] = views.result[nv + i];
     if (settings.actualOff.includes("zeros")) motors = baseWrench();
@@ -247,6 +250,7 @@ export function createEngine(mj, module, robot) {
     // "" while the controller runs, then why it stopped: "fell", "left the ground",
     // "infeasible", "no answer"
     get outcome() { return outcome; },
+    get conflict() { return conflict; },
     get pushes() { return pushes; },
     get walk() { return walk; },
     // Names of the feet in the air.
@@ -304,6 +308,17 @@ export function createEngine(mj, module, robot) {
       return forces;
     },
     torques: () => [...views.result.subarray(nv, nv + d)],
+    // The facets of each friction cone as the controller assumes them: a row times a force is at
+    // most zero inside.
+    facets() {
+      const first = tick.problem.parameters.cones;
+      return Array.from({length: settings.facets},
+        (_, i) => [...views.floats.subarray(first + 5 * i, first + 5 * i + 3)]);
+    },
+    // What more friction at a contact point would bring, see what_if.js.
+    frictionValue(name) {
+      return outcome === "" ? frictionValue(tick, robot, name, this.activeConstraints()) : null;
+    },
     // Active constraints: [kind, owner, number, multiplier].
     activeConstraints() {
       if (outcome !== "" || active <= 0) return [];

@@ -1,18 +1,18 @@
 // The worker of a page with a live robot: it holds the engine, and steps it when the page asks for
 // a picture. A page that draws nothing lets the robot rest.
 //
-// From the page: {start}, {set}, {push}, {reset}, {pause}, {step}, {timeScale}, {frame},
-// {recovery}, {stop}, {undo}, {resetAll}; to the page: {ready}, {frame}, {stoodUp}, {settings},
-// {recovery}, {error}. {settings} are those that the page did not set itself. An error with
-// `isRefusal` says why a message makes no sense; then nothing has changed.
+// From the page: {start}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset}, {pause},
+// {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp},
+// {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
+// with `isRefusal` says why a message makes no sense; then nothing has changed.
 
-import {createEngine, STEP} from "./engine.js";
+import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
 import {createHistory} from "./history.js";
 import {pushRecovery} from "./recovery.js";
 import {
-  Refusal, SWITCH, check, checkNames, defaults, liftedFeet, numberRule,
+  Refusal, SWITCH, check, checkNames, choiceRule, defaults, liftedFeet, numberRule,
 } from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
@@ -21,6 +21,8 @@ let resting = []; // joints that are at the end of their range when the robot st
 let around = null; // names of the contact points, and the weight
 const clock = createClock(STEP), history = createHistory();
 let first = null; // the settings of "reset everything"
+let challenge = null, judge = null; // what is to be solved, or null, and who watches
+let foot = null; // the contact point whose force the page explains
 let velocity = null; // of the centre of mass at the last picture: {time, value}
 // constraints that were active, and contact points that slipped, since the last picture
 const seen = new Map(), slipping = new Set();
@@ -78,6 +80,7 @@ function restart(settings = {}) {
   engine.set(settings);
   engine.reset();
   slipTime = null;
+  judge = challenge && createJudge(challenge, first);
 }
 function change(settings) {
   const before = engine.settings;
@@ -93,25 +96,30 @@ function frame() {
   slipping.clear();
   for (; done < count; done++) {
     if (engine.isAtRest) {
+      const before = judge;
       restart();
+      if (before?.status.isWon) judge = before; // it stays solved
       postMessage({stoodUp: true});
     }
+    const wasRunning = engine.outcome === "";
     engine.step();
+    if (wasRunning && engine.outcome !== "") judge?.ended(engine.outcome, engine.settings);
     for (const one of engine.activeConstraints()) seen.set(one.slice(0, 3).join(), one);
     if (done % SAMPLE < SAMPLE - 1) continue;
-    watchSlip();
+    watch(SAMPLE);
     if (performance.now() - begin > clock.budget) {
       done++;
       break;
     }
   }
-  if (done % SAMPLE > 0) watchSlip(); // a picture in slow motion has few steps
+  if (done % SAMPLE > 0) watch(done % SAMPLE); // a picture in slow motion has few steps
   clock.done(done, performance.now() - begin);
   postMessage({frame: picture()});
 }
 
-function watchSlip() {
+function watch(steps) {
   if (engine.outcome !== "") return;
+  judge?.observe(sampleOf(engine, robot, steps * STEP), engine.settings);
   const forces = {measured: engine.measuredForces(), planned: engine.plannedForces()};
   for (const name of slippingPoints({...forces, settings: engine.settings}, around)) {
     slipping.add(name);
@@ -156,10 +164,13 @@ function picture() {
   ]);
   return {
     rotations, positions, contacts, com: engine.com(), time: engine.time, terms: termForces(),
+    facets: engine.facets(), conflict: engine.conflict,
+    foot: foot && {name: foot, ...engine.frictionValue(foot)},
     measured: engine.measuredForces(), planned: engine.plannedForces(),
     active: engine.activeConstraints(), seen: [...seen.values()], slipping: [...slipping],
     hasSlipped: slipTime !== null,
     outcome: engine.outcome, pushes: engine.pushes,
+    challenge: judge?.status ?? null,
     lifted: engine.lifted, settings: engine.settings, factor: clock.factor,
     stepTime: clock.stepTime,
   };
@@ -181,7 +192,24 @@ const handlers = {
     clock.setScale(1);
     postMessage({settings: engine.settings});
   },
-  push: (push) => engine?.push(push),
+  push(push) {
+    engine?.push(push);
+    judge?.push(push);
+  },
+  // Watch the force at a contact point, or at none: null.
+  foot(name) {
+    check("foot", name, choiceRule([null, ...around.points]));
+    foot = name;
+  },
+  // Start a challenge by its title, or return to free play: null.
+  challenge(title) {
+    check("challenge", title, choiceRule([null, ...challenges.map((each) => each.title)]));
+    challenge = challenges.find((each) => each.title === title) ?? null;
+    first = {...defaults(robot), ...challenge && startOf(challenge)};
+    history.clear();
+    restart(first);
+    postMessage({settings: engine.settings});
+  },
   reset: () => engine && restart(),
   pause(isPaused) {
     check("pause", isPaused, SWITCH);

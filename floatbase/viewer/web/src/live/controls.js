@@ -1,6 +1,7 @@
 // Controls of a live robot: commands for the viewer's panel, what each of them changes, and what it
 // shows.
 
+import {challenges} from "../engine/challenges.js";
 import {rangeOf, rows, terms} from "../engine/settings.js";
 import {footName} from "./words.js";
 
@@ -9,6 +10,8 @@ const SIDES = { // texts on the switches of a term
   assumed: {part: "model", setting: "assumedOff"}, actual: {part: "reality", setting: "actualOff"},
 };
 const NO_ARROWS = "This page draws no arrows for this term. The playground does.";
+const CHALLENGED = "go2"; // the robot with challenges, as in the playground
+const titles = challenges.map(({title}) => title);
 export const SHOWN_AT_FIRST = ["forces", "cones"]; // terms
 
 // The text of a control, such as "CoM x [cm]". row: of the table of settings.
@@ -78,6 +81,8 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, draw
     control("robot", {value: names.indexOf(name), choices: names}, (value) => {
       open(names[value]);
     }),
+    ...(name === CHALLENGED ? [control("challenge", {value: 0, choices: ["free play", ...titles]},
+      (value) => ({challenge: titles[value - 1] ?? null}))] : []),
     ...pair("friction", "mu", "actualMu"),
     ...pair("payload", "payload", "actualPayload"),
     slider("gravity", "gravity"),
