@@ -58,7 +58,8 @@ function compareStates() {
     found.states++;
     if (answer === NO_ANSWER.infeasible) {
       const rows = smallestConflict(engine.tick, robot);
-      found.conflicts.push({state: found.states - 1, rows, unchanged: engine.tick.run() === answer});
+      const unchanged = engine.tick.run() === answer;
+      found.conflicts.push({state: found.states - 1, rows, unchanged});
     }
     if (count < 0) found.infeasible++;
     else found.active += count;

@@ -5,12 +5,14 @@
 // ?name=…&mu=…&push=…&gait=…&panel=0. Values that make no sense are refused in words, and count as
 // not given.
 
+import {toCode} from "./colours.js";
 import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
 import {readAddress} from "./live/attributes.js";
-import {controlsOf} from "./live/controls.js";
+import {controlsOf, labelOf, settingsText} from "./live/controls.js";
+import {createFootView} from "./live/foot_view.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
@@ -23,7 +25,6 @@ const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
 const DEFAULT_PUSH = 0.25; // times the weight
 const STEPS_BY = 5; // N, of a push that is dragged
-const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
@@ -76,7 +77,15 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const push = {force, towards: 90, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
-    scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
+    size: drawing.size, name, say: (content) => text("map", content),
+    explain: (maps) => scene.handle({type: "set_legend", path: "", items: [
+      ...drawing.legend, ...maps.map(([colour, words]) => [toCode(colour), words, "line"]),
+    ]}),
+  });
+  const footView = createFootView(scene.viewer, robot, drawing, (foot) => {
+    send({foot});
+    scene.handle({type: "set_control_value", path: "", name: labelOf(rows.foot),
+      value: robot.points.indexOf(foot) + 1});
   });
   const newtons = make("output", {className: "newtons"});
   document.body.append(newtons);
@@ -111,7 +120,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   }
   const first = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
   const controls = controlsOf(robot, {...settings, gait: first}, push, {
-    names: config.robots, name, walk, draw: painter.show,
+    names: config.robots, name, walk, draw: painter.show, watch: footView.watch,
     open(other) {
       given.texts.set("name", other);
       location.search = given.texts;
@@ -141,7 +150,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
     },
     "push-recovery map"() {
       const {settings: present, com} = frame;
-      drawMap({...present, lifted: null, gait: null}, com);
+      drawMap(present, settingsText(controls, present, settings), com);
     },
   };
   if (hasPanel) {
@@ -208,6 +217,7 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   function draw(next) {
     frame = next;
     painter.draw(frame);
+    footView.draw(frame);
     const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
     if (dragged) painter.drawPush(dragged.world, dragged.force);
     else if (acting) painter.drawPush(placeOf(acting), acting.force);

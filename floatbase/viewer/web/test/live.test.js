@@ -10,9 +10,10 @@ import {numberOf} from "../src/controls.js";
 import {readAddress} from "../src/live/attributes.js";
 import {setParameter} from "../src/engine/tick.js";
 import {controlsOf, labelOf} from "../src/live/controls.js";
+import {footText, nearestFacet, polygon} from "../src/live/foot_view.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
-import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
+import {deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
 import {
   conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
 } from "../src/live/words.js";
@@ -108,7 +109,7 @@ test("the sentence names what limits the robot, the most important first", () =>
     ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
   assert.match(text({outcome: "infeasible", conflict}),
     /friction of the front left foot; torque limit of the rear left calf joint and rear left hip/);
-  assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .* \(facet 4\)/);
+  assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
 });
 
 test("parts have names that a reader knows", () => {
@@ -139,7 +140,7 @@ test("a control has its name, its symbol and its unit", () => {
 test("controls begin at the settings of the engine and change what they name", () => {
   const data = {
     weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}},
-    legs: ["FL_foot", "RR_foot"],
+    legs: ["FL_foot", "RR_foot"], points: ["FL_foot", "RR_foot"],
   };
   const settings = defaults({...data, legs: {FL_foot: [], RR_foot: []}});
   const push = {force: 30, towards: 90, duration: 0.1};
@@ -177,7 +178,7 @@ test("controls begin at the settings of the engine and change what they name", (
 
 test("the board has every term, and a switch keeps the other terms of its side", () => {
   const page = {
-    weight: 100, facets: [4], gaits: {}, lifted: [], legs: ["FL_foot"],
+    weight: 100, facets: [4], gaits: {}, lifted: [], legs: ["FL_foot"], points: ["FL_foot"],
   };
   const settings = defaults({mu: 0.7, gravity: 9.81, facets: [4], legs: {FL_foot: []}});
   const calls = {names: [], name: "", open() {}, walk() {}, draw() {}};
@@ -222,9 +223,10 @@ const go2 = {
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
-    legs: Object.keys(go2.legs), gaits: go2.walking.gaits};
+    legs: Object.keys(go2.legs), points: Object.keys(go2.legs), gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
     names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), draw() {},
+    watch() {},
   });
   let beyond = 0;
   for (const {command: {min, max, choices, value}, change} of made) {
@@ -275,6 +277,19 @@ test("a robot without gaits cannot walk", () => {
   checkSettings({gait: null, speed: 0}, {...go2, walking: null});
 });
 
+test("the polygon of a foot is that of its facets, and knows the nearest one", () => {
+  const facets = [[1, 0, -0.5], [0, 1, -0.5], [-1, 0, -0.5], [0, -1, -0.5]]; // a square
+  const corners = polygon(facets, 10);
+  for (const at of corners) for (const x of at) assert.ok(Math.abs(Math.abs(x) - 5) < 1e-9);
+  assert.equal(new Set(corners.map((at) => at.map(Math.sign).join())).size, 4);
+  const {distance, facet} = nearestFacet(facets, [1, -4, 10]);
+  assert.ok(facet === 3 && Math.abs(distance - 1) < 1e-12);
+  assert.match(footText(facets, [1, -4, 10], null, 1), /1.0 N inside .*facet 4/);
+  const worth = {now: 2, then: 1.5, cost: 0.12};
+  assert.match(footText(facets, [1, -5, 10], worth, 1), /0.50 m\/s² closer .* 2.0 .* 0.12/);
+  assert.match(footText(facets, [0, 0, 0], null, 1), /no force/);
+});
+
 test("the largest multipliers come first", () => {
   const lines = multiplierText([["friction", "FL_foot", 0, 0.1],
     ["upper torque limit", "FL_calf_joint", 0, 2]]).split("\n");
@@ -300,19 +315,21 @@ test("a search finds the largest number that passes, wherever it begins", () => 
   assert.ok(largest(() => true, 30, 30, 100) > 100);
 });
 
-test("a direction has the angle of the slider and words", () => {
-  const words = [0, 30, 90, 150, 180, 225, 270, 340]
-    .map((degrees) => directionText(degrees * Math.PI / 180));
-  assert.deepEqual(words, ["0° (forwards)", "30° (forwards left)", "90° (left)",
-    "150° (backwards left)", "180° (backwards)", "-135° (backwards right)", "-90° (right)",
-    "-20° (forwards)"]);
-});
-
 test("a map grows around its centre and closes when it is complete", () => {
   const found = [{direction: Math.PI / 2, push: 20}, {direction: 0, push: 10}];
   const points = outline(found, [1, 1], 0.1, false);
   assert.deepEqual(points[0].slice(0, 2), [2, 1]);
   assert.ok(Math.abs(points[1][1] - 3) < 1e-12);
   assert.equal(outline(found, [1, 1], 0.1, true).length, 3);
-  assert.match(mapText(found, 1), /10 N towards 0° \(forwards\), at most 20 N towards 90° \(left/);
+  assert.match(mapText(found, "standing", 1), /from 10 N \(forwards\) to 20 N \(left\)/);
+  const ways = [-170, -90, -20, 30, 180].map((degrees) => wayOf((degrees + 360) * Math.PI / 180));
+  assert.deepEqual(ways, ["backwards", "right", "forwards", "forwards left", "backwards"]);
+});
+
+test("a few round rings hold every push", () => {
+  for (const most of [1, 3, 7, 24, 40, 41, 99, 100, 255, 260, 1900]) {
+    const rings = ringsFor(most);
+    assert.ok(rings.length >= 2 && rings.length <= 4 && rings.at(-1) >= most, `${most}: ${rings}`);
+    assert.ok(rings.at(-1) < 2 * most + 1);
+  }
 });

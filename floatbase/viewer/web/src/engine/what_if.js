@@ -10,7 +10,7 @@ function constraints({views, problem}, {d}) {
   const {floats, inputs} = views, {parameters, points, rows} = problem;
   const {cones, torqueLimits, bounds} = parameters;
   const perPoint = rows.findIndex(([kind]) => kind === "largest normal force") / points.length;
-  return rows.slice(0, (perPoint + 1) * points.length + d).map(([kind, , number], row) => ({
+  return rows.slice(0, (perPoint + 1) * points.length + d).map(([kind], row) => ({
     row,
     remove() {
       const point = Math.floor(row / perPoint);

@@ -9,6 +9,7 @@
 import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
+import {createEngine, STEP} from "./engine.js";
 import {createHistory} from "./history.js";
 import {pushRecovery} from "./recovery.js";
 import {

@@ -3,7 +3,7 @@
 
 import {challenges} from "../engine/challenges.js";
 import {rangeOf, rows, terms} from "../engine/settings.js";
-import {footName} from "./words.js";
+import {footName, pointName} from "./words.js";
 
 const SPEEDS = [1, 0.5, 0.25, 0.1];
 const SIDES = { // texts on the switches of a term
@@ -18,12 +18,27 @@ export const SHOWN_AT_FIRST = ["forces", "cones"]; // terms
 export const labelOf = ({name, symbol = "", unit = ""}) => (
   [name, symbol, unit && `[${unit}]`].filter((part) => part).join(" "));
 
+// What the controls say about settings that differ from `first`, such as "trot, torque limits [%]
+// 50". controls: as from `controlsOf`.
+export function settingsText(controls, settings, first) {
+  const changed = controls.filter(({shown, command}) => (
+    shown && command.name !== rows.gait.name && shown(settings) !== shown(first)));
+  const words = changed.map(({command: {name, choices}, shown}) => {
+    const value = shown(settings);
+    if (typeof value === "boolean") return `${name} ${value ? "on" : "off"}`;
+    return `${name} ${choices ? choices[value] : Number(value.toPrecision(3))}`;
+  });
+  const {gait, speed} = settings;
+  return [gait ? `${gait}, ${speed.toFixed(2)} m/s` : "standing", ...words].join(", ");
+}
+
 // The controls of a robot: [{command, change(value), shown(settings)}]; change returns messages for
 // the worker: {set}, {timeScale} and others. shown returns the value for settings of the engine; it
 // is null for a control of something else. push: {force, towards, duration}, changed in place.
 // open: called with another robot's name. walk: called with the name of a gait, or null to stand.
-// draw: called with a term of eq. (7), and whether to draw it.
-export function controlsOf(robot, settings, push, {names, name, open, walk, draw}) {
+// draw: called with a term of eq. (7), and whether to draw it. watch: called with the name of a
+// contact point, or null.
+export function controlsOf(robot, settings, push, {names, name, open, walk, draw, watch}) {
   const control = (label, command, change, shown = null) => {
     const present = shown ? {value: shown(settings)} : {};
     return {
@@ -99,6 +114,9 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, draw
     choice("facets", robot.facets.map(String), (value) => (
       {set: {facets: robot.facets[value]}}), ({facets}) => robot.facets.indexOf(facets)),
     slider("torque_limits", "torque"),
+    control(labelOf(rows.foot), {
+      value: 0, choices: ["none", ...robot.points.map(pointName)], section: rows.foot.section,
+    }, (value) => { watch(robot.points[value - 1] ?? null); }),
     ...board,
   ];
 }

@@ -14,6 +14,12 @@ export function footName(name) {
   return human ? `${human} foot` : name;
 }
 
+// "left_sole_link corner 1" -> "left foot, corner 2": the name of a contact point.
+export function pointName(name) {
+  const [, corner] = / corner (\d+)$/.exec(name) ?? [];
+  return corner ? `${footName(name)}, corner ${Number(corner) + 1}` : footName(name);
+}
+
 // "FL_calf_joint" -> "front left calf joint", "leg_left_4_joint" -> "leg left 4 joint".
 export function jointName(name) {
   const [, end, side, rest] = /^([FRH])([LR])_(.+?)(?:_joint)?$/.exec(name) ?? [];
