@@ -5,7 +5,6 @@
 // ?name=…&mu=…&push=…&gait=…&panel=0. Values that make no sense are refused in words, and count as
 // not given.
 
-import {toCode} from "./colours.js";
 import {numberOf} from "./controls.js";
 import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
@@ -78,9 +77,6 @@ function live(scene, worker, send, {drawing, settings, robot}, {config, given, n
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
     size: drawing.size, name, say: (content) => text("map", content),
-    explain: (maps) => scene.handle({type: "set_legend", path: "", items: [
-      ...drawing.legend, ...maps.map(([colour, words]) => [toCode(colour), words, "line"]),
-    ]}),
   });
   const footView = createFootView(scene.viewer, robot, drawing, (foot) => {
     send({foot});

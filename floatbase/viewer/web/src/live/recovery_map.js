@@ -1,14 +1,16 @@
 // A push-recovery map for the present settings: the largest push that the robot survives in each
 // direction, computed by a few workers and drawn on the ground as it grows, with rings that have
-// numbers. The map before it stays visible in grey. The legend says what each of them is.
+// numbers. The map before it stays visible in grey. Labels say what each of them is.
 
+import {toCode} from "../colours.js";
 import {three} from "../meshcat.js";
 
 const DIRECTIONS = 16, DURATION = 0.1, RESOLUTION = 5; // -, s, N: those of `fb.push_recovery`
 const FEWEST_WORKERS = 2, MOST_WORKERS = 4;
 const HEIGHT = 0.004; // m above the ground
-const NOW = 0x0072b2, BEFORE = 0x888888, RING = 0xaaaaaa;
+const NOW = 0x0072b2, BEFORE = 0x777777, RING = 0xbbbbbb;
 const MOST_RINGS = 4, CORNERS = 64; // of a circle
+const LETTERS = 0.05; // height of a label, times the robot's size
 const RADIUS = 0.75; // of the largest push, times the robot's size: it fits the picture
 
 // Angles of the directions, rad, an arc for each worker, which begins each search at the result of
@@ -38,12 +40,11 @@ const WAYS = ["forwards", "forwards left", "left", "backwards left", "backwards"
 // "forwards left": the direction of an angle, rad.
 export const wayOf = (angle) => WAYS[Math.round(angle * 4 / Math.PI) % 8];
 
-// The forces of the rings: multiples of 1, 2 or 5 times a power of ten, the last one at least
-// `most`, N.
+// The forces of the rings up to `most`, N: multiples of 1, 2 or 5 times a power of ten.
 export function ringsFor(most) {
   const power = 10 ** Math.floor(Math.log10(most / MOST_RINGS));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power * MOST_RINGS >= most);
-  return Array.from({length: Math.ceil(most / step)}, (_, i) => (i + 1) * step);
+  return Array.from({length: Math.floor(most / step)}, (_, i) => (i + 1) * step);
 }
 
 // The extremes of a map in words. what: such as "trot, 0.30 m/s".
@@ -59,10 +60,10 @@ export function mapText(found, what, seconds) {
     `${strong}, ${state}.`;
 }
 
-// viewer: meshcat's. size: of the robot, m. say(text): writes a text into the panel. explain(maps):
-// shows [[colour, text], …] in the legend. name: of the robot.
-export function createRecoveryMap(viewer, {size, name, say, explain}) {
-  let workers = [], rings = [];
+// viewer: meshcat's. size: of the robot, m. say(text): writes a text into the panel. name: of the
+// robot.
+export function createRecoveryMap(viewer, {size, name, say}) {
+  let workers = [], drawn = [];
   const maps = []; // the present one first
   function line(colour, points = []) {
     const {BufferGeometry, Line, LineBasicMaterial, Vector3} = three();
@@ -72,20 +73,35 @@ export function createRecoveryMap(viewer, {size, name, say, explain}) {
     made.frustumCulled = false;
     return made;
   }
-  // A number that faces the viewer.
-  function label(text, at) {
+  // The inside of a map.
+  function area(colour, points, centre) {
+    const {DoubleSide, Mesh, MeshBasicMaterial, Shape, ShapeGeometry, Vector2} = three();
+    const corners = points.map(([x, y]) => new Vector2(x - centre[0], y - centre[1]));
+    const made = new Mesh(new ShapeGeometry(new Shape(corners)), new MeshBasicMaterial(
+      {color: colour, transparent: true, opacity: 0.25, side: DoubleSide, depthWrite: false},
+    ));
+    made.position.set(centre[0], centre[1], HEIGHT);
+    return made;
+  }
+  // Text that faces the viewer.
+  function label(text, at, colour = "#222") {
     const {CanvasTexture, Sprite, SpriteMaterial} = three();
-    const canvas = Object.assign(document.createElement("canvas"), {width: 128, height: 48});
-    const pen = canvas.getContext("2d");
-    pen.fillStyle = "#ffffffd0";
+    const canvas = document.createElement("canvas"), font = "32px system-ui, sans-serif";
+    let pen = canvas.getContext("2d");
+    pen.font = font;
+    Object.assign(canvas, {width: pen.measureText(text).width + 20, height: 48});
+    pen = canvas.getContext("2d");
+    pen.fillStyle = "#ffffffe0";
     pen.fillRect(0, 0, canvas.width, canvas.height);
-    pen.fillStyle = "#222";
-    pen.font = "32px system-ui, sans-serif";
+    pen.fillStyle = colour;
+    pen.font = font;
     pen.textAlign = "center";
     pen.fillText(text, canvas.width / 2, 36);
-    const made = new Sprite(new SpriteMaterial({map: new CanvasTexture(canvas)}));
+    const made = new Sprite(new SpriteMaterial(
+      {map: new CanvasTexture(canvas), depthTest: false},
+    ));
     made.position.set(...at);
-    made.scale.set(0.16 * size, 0.06 * size, 1);
+    made.scale.set(LETTERS * size * canvas.width / canvas.height, LETTERS * size, 1);
     return made;
   }
   function remove(one) {
@@ -97,21 +113,23 @@ export function createRecoveryMap(viewer, {size, name, say, explain}) {
   // Draw all maps and their rings with one scale, which fits the largest push.
   function draw() {
     const most = Math.max(1, ...maps.flatMap(({found}) => found.map(({push}) => push)));
-    const forces = ringsFor(most), scale = RADIUS * size / forces.at(-1), {centre} = maps[0];
-    for (const one of [...rings, ...maps.map((map) => map.line)]) if (one) remove(one);
-    rings = forces.flatMap((force) => {
+    const forces = ringsFor(most), scale = RADIUS * size / most, {centre} = maps[0];
+    drawn.forEach(remove);
+    drawn = forces.flatMap((force) => {
       const points = Array.from({length: CORNERS + 1}, (_, i) => (
         {direction: 2 * Math.PI * i / CORNERS, push: force}));
-      const at = [centre[0], centre[1] - scale * force, HEIGHT + 0.03 * size];
+      const at = [centre[0], centre[1] + scale * force, HEIGHT + 0.03 * size];
       return [line(RING, outline(points, centre, scale, false)), label(`${force} N`, at)];
     });
-    maps.forEach((map, i) => {
-      map.line = line(i ? BEFORE : NOW,
-        outline(map.found, centre, scale, map.found.length === DIRECTIONS));
+    maps.forEach(({found, what}, i) => {
+      const colour = i ? BEFORE : NOW, points = outline(found, centre, scale,
+        found.length === DIRECTIONS), away = centre[1] + (1.15 + 0.45 * i) * RADIUS * size;
+      if (found.length > 2) drawn.push(line(colour, points), area(colour, points, centre));
+      drawn.push(label(`largest push survived: ${what}`, [centre[0], away, HEIGHT],
+        toCode(colour)));
     });
-    for (const one of [...rings, ...maps.map((map) => map.line)]) viewer.scene.add(one);
+    for (const one of drawn) viewer.scene.add(one);
     viewer.set_dirty();
-    explain(maps.map(({what}, i) => [i ? BEFORE : NOW, `largest push survived: ${what}`]));
   }
   function end() {
     for (const worker of workers) worker.terminate();
@@ -120,8 +138,8 @@ export function createRecoveryMap(viewer, {size, name, say, explain}) {
   // settings: those of the page. what: what is special about them. centre: below the robot, [x, y].
   return function start(settings, what, centre) {
     end();
-    const mine = {found: [], what, centre, line: null}, begun = performance.now();
-    for (const old of maps.splice(1)) if (old.line) remove(old.line);
+    const mine = {found: [], what, centre}, begun = performance.now();
+    maps.splice(1);
     maps.unshift(mine);
     const free = (navigator.hardwareConcurrency || 2) - 1; // one core draws
     const count = Math.max(FEWEST_WORKERS, Math.min(MOST_WORKERS, free));
