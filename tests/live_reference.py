@@ -16,7 +16,6 @@ from floatbase.control import Command
 from floatbase.control.tick import tick
 from floatbase.friction import FrictionPolyhedron
 from floatbase.live import robots
-from floatbase.robots import State
 from floatbase.playground import (
     CHALLENGES,
     PERIOD,
@@ -26,6 +25,7 @@ from floatbase.playground import (
     PerturbedSimulation,
     Session,
 )
+from floatbase.robots import State
 
 STATES_PER_ROBOT = 200
 RUN_TIME = 1.5  # s
@@ -126,7 +126,10 @@ def write(folder: Path) -> None:
 
 def conflicts(folder: Path, found: list[dict[str, Any]]) -> list[list[bool]]:
     """For each conflict that the page found: whether its rows can hold, and without each row."""
-    index, numbers = json.loads((folder / "states.json").read_text()), np.fromfile(folder / "states.bin")
+    index, numbers = (
+        json.loads((folder / "states.json").read_text()),
+        np.fromfile(folder / "states.bin"),
+    )
     starts, holds = np.cumsum([0] + [sum(each["lengths"]) for each in index]), []
     for each in found:
         given = index[each["state"]]
@@ -138,10 +141,9 @@ def conflicts(folder: Path, found: list[dict[str, Any]]) -> list[list[bool]]:
         names = [(row.kind, row.owner, row.number or 0) for row in qp.inequality_names]
         rows = [names.index(tuple(row)) for row in each["rows"]]
         sets = [rows, *([other for other in rows if other != row] for row in rows)]
-        holds.append([
-            linprog(np.zeros(qp.A.shape[1]), qp.G[some], qp.h[some], qp.A, qp.b, (None, None)).status
-            == 0 for some in sets
-        ])  # fmt: skip
+        zero = np.zeros(qp.A.shape[1])
+        answers = [linprog(zero, qp.G[some], qp.h[some], qp.A, qp.b, (None, None)) for some in sets]
+        holds.append([answer.status == 0 for answer in answers])
     return holds
 
 

@@ -307,7 +307,10 @@ def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
     if judge.memory["up"] >= _LIMITS["lifting_time"]:
         return f"Lifting took {judge.memory['up']:.2f} s. Reset, and lean first."
     judge.memory["score"] = f"{judge.memory['up']:.2f} s."
-    return held >= _LIMITS["lifted_time"] or f"Lifted in {judge.memory['up']:.2f} s, in the air for {held:.1f} s."
+    return (
+        held >= _LIMITS["lifted_time"]
+        or f"Lifted in {judge.memory['up']:.2f} s, in the air for {held:.1f} s."
+    )
 
 
 def _feet_that_travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
