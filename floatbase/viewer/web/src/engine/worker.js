@@ -24,7 +24,7 @@ const clock = createClock(STEP), history = createHistory();
 let first = null; // the settings of "reset everything"
 let challenge = null, judge = null; // what is to be solved, or null, and who watches
 let foot = null; // the contact point whose force the page explains
-let velocity = null; // of the centre of mass at the last picture: {time, value}
+let motion = null; // of the centre of mass at the last picture: {time, velocity, acceleration}
 // constraints that were active, and contact points that slipped, since the last picture
 const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
@@ -133,14 +133,16 @@ function watch(steps) {
 function termForces() {
   const {actualOff: off} = engine.settings, base = robot.bodies[1];
   const {data, model} = engine.actual, mass = model.body_subtreemass[base], com = engine.com();
-  const now = {time: engine.time, value: engine.comVelocity()}, past = velocity ?? now;
-  velocity = now;
+  const {time} = engine, velocity = engine.comVelocity();
+  if (motion === null || time < motion.time) motion = {time, velocity, acceleration: [0, 0, 0]};
+  if (time > motion.time) { // else the robot is paused
+    const elapsed = time - motion.time;
+    const acceleration = velocity.map((x, i) => (x - motion.velocity[i]) / elapsed);
+    motion = {time, velocity, acceleration};
+  }
   const weight = [0, 0, off.includes("gravity") ? 0 : -mass * engine.settings.gravity];
-  const elapsed = now.time - past.time;
   return {
-    inertia: {at: com, force: now.value.map(
-      (x, i) => elapsed > 0 ? mass * (x - past.value[i]) / elapsed : 0,
-    )},
+    inertia: {at: com, force: motion.acceleration.map((x) => mass * x)},
     velocity: {
       at: [...data.xpos.subarray(3 * base, 3 * base + 3)],
       force: off.includes("velocity") ? [0, 0, 0]
