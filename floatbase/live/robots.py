@@ -54,6 +54,7 @@ _WALK_CONSTANTS = {
     "pathShift": plan.PATH_SHIFT_THRESHOLD,
     "sideFraction": MIN_SIDE_FRACTION,
 }
+_SIZES: Any = vars(tick)["size"]  # names of the entries of the tick's `sizes`
 _TOLERANCE = 1e-12  # relative, of numbers that depend linearly on a value
 
 
@@ -66,6 +67,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         )
     sim = Simulation(robot, MU, TIMESTEP)
     sim.reset(robot.standing())
+    feet = Contacts.feet(robot)
     return {
         "name": robot.name,
         "nq": robot.nq,
@@ -78,6 +80,7 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         "facets": FACETS,
         "jointNames": list(robot.joint_names),
         "torqueLimits": robot.torque_limits.tolist(),
+        "legs": {name: list(feet.only(name).point_names) for name in feet.names},
         **model_data(sim),
         "problems": {
             **{
@@ -159,6 +162,7 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
     compiled = _compiled(made)
     sizes, ints, floats = compiled.pack(made.problem)
     inputs = compiled.default_inputs
+    n_rows = made.limits.facets + 1  # of a cone
     n_floats, n_ints = tick.workspace_sizes(sizes, inputs.packed.size)
 
     def packed_with(mu: float = MU, torque_fraction: float = 1.0) -> Array:
@@ -176,13 +180,30 @@ def _problem_data(made: WholeBodyController, stance: Callable[[float], Contacts]
         "resultSize": compiled.empty_result(inputs).size,
         "k": made.contacts.k,
         "points": list(made.contacts.point_names),
+        # the integers begin with a row of 6 for each joint, then one of 9 for each contact: its
+        # seventh number says that the controller ignores the contact's force
+        "legs": {
+            name: 6 * int(sizes[_SIZES.N_JOINTS]) + 9 * i + 6
+            for i, name in enumerate(made.contacts.names)
+        },
+        "flags": {
+            "sameRows": _SIZES.SAME_ROWS,
+            "underactuated": _SIZES.UNDERACTUATED,
+            "cones": _SIZES.HAS_CONES,
+        },
         "rows": compiled.row_owners,
         "parameters": {
             "mu": _friction_places(packed_with, MU),
             "torque": _linear_places(lambda fraction: packed_with(torque_fraction=fraction), 1.0),
+            # the tables end with cones, torque limits, joint limits (6, d) and three numbers
+            "cones": floats.size - 3 - 7 * made.robot.d - 5 * made.contacts.n_points * n_rows,
+            # minimum and maximum normal forces follow the targets
+            "bounds": compiled.layout.size,
+            "torqueLimits": floats.size - 3 - 7 * made.robot.d,
             # the tables begin with `Model.terms` and the links, of which the first is the world
             "gravity": 2,
             "velocityForces": dynamics.VELOCITY_FACTOR,
+            "drift": dynamics.DRIFT_FACTOR,
             "baseMass": dynamics.N_TERMS + (dynamics.MASS + 1) + dynamics.MASS,
         },
     }

@@ -13,6 +13,7 @@ import numpy as np
 from floatbase.dynamics import UP, Contacts
 from floatbase.friction import FrictionPolyhedron
 from floatbase.live.robots import FACETS
+from floatbase.live.settings import TERMS
 from floatbase.robots import Robot
 from floatbase.viewer import Viewer
 from floatbase.viewer.export import thumbnail
@@ -21,6 +22,8 @@ from floatbase.viewer.scene.painter import MIN_FORCE, Painter
 from floatbase.viewer.scene.shapes import Item, Picture, path_part, prefixed
 
 IMAGE_HEIGHT = 480  # pixels
+# what the arrows are that the page draws, by term of eq. (7)
+TERM_ARROWS = {row["name"]: row["arrow"] for row in TERMS if row.get("page_arrow")}
 
 
 def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
@@ -44,6 +47,11 @@ def scene_files(robot: Robot) -> tuple[bytes, bytes, dict[str, Any]]:
         outline = geometry.surface_of_revolution(unit_shapes.ARROW)
         push = threejs.mesh(*outline, colours.PUSH, on_top=True)
         picture["push/arrow"] = Item(push, shapes.transform(standing.com, scale=0.1))
+        for name, meaning in TERM_ARROWS.items():
+            arrow = threejs.mesh(*outline, colours.COM)
+            picture[f"term/{name}"] = Item(arrow, shapes.transform(standing.com, scale=0.1))
+            words = meaning.split(",")[0]
+            picture[f"word/{name}"] = shapes.label(standing.com, words, 0.06 * view.painter.size)
         view.draw(picture)
         # the camera follows the base
         view.camera(follow=True)

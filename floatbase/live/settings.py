@@ -1,8 +1,9 @@
 """The controls of the live page, the playground and the lessons.
 
-`settings.json` has one row for each control. Name, unit, range and initial value are the same in
-all of its places. The live page contains the table (`make web`), and its engine accepts no other
-values.
+`settings.json` has one row for each control, `equation.json` one for each term of eq. (7), and
+`challenges.json` one for each challenge. Name, unit, range and initial value of a control are the
+same in all of its places. The live page contains the tables (`make web`), and its engine accepts
+no other values.
 """
 
 from __future__ import annotations
@@ -12,9 +13,15 @@ import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
-_ROWS: dict[str, dict[str, Any]] = json.loads(
-    Path(__file__).with_name("settings.json").read_text(encoding="utf-8")
-)
+
+def _table(name: str) -> Any:
+    """Return a table that the live page contains, too."""
+    return json.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+
+
+_ROWS: dict[str, dict[str, Any]] = _table("settings.json")
+TERMS: list[dict[str, Any]] = _table("equation.json")  # of eq. (7)
+CHALLENGE_TABLE: dict[str, Any] = _table("challenges.json")
 
 
 class Setting(NamedTuple):

@@ -1,4 +1,8 @@
-"""Ten challenges, each with initial settings, locked settings and a judge that watches the run."""
+"""Ten challenges, each with initial settings, locked settings and a judge that watches the run.
+
+`live/challenges.json` has their texts, settings and limits. The live page has judges of its own for
+six of them, which read the same table.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +26,22 @@ from floatbase._validation import (
 )
 from floatbase.errors import unknown_name
 from floatbase.friction import FrictionPolyhedron
+from floatbase.live.settings import CHALLENGE_TABLE
 from floatbase.playground.session import Session
 from floatbase.playground.settings import PAIR_NAMES, SETTING_NAMES, Settings
 
-_MIN_LOAD = 5.0  # N: a foot with a larger normal force counts as loaded
-_LIFTED_HEIGHT = 0.02  # m above the ground: a higher foot counts as lifted
-_FACET_TOLERANCE = 1e-4  # fraction of the normal force: a force nearer to a facet counts as active
+_LIMITS: dict[str, float] = CHALLENGE_TABLE["limits"]
+_MIN_LOAD = _LIMITS["min_load"]  # N: a foot with a larger normal force counts as loaded
+_LIFTED_HEIGHT = _LIMITS["lifted_height"]  # m above the ground: a higher foot counts as lifted
 _SLIDE_DISTANCE = 0.3  # m, twice as far as the robot slides with the initial settings
 _TRAVEL_DISTANCE = 0.012  # m that each foot must travel in the seventh challenge
 _MAX_SLIP = 0.004  # m: a rolling foot creeps by less
-_FORCE_ROUNDING = 1e-9  # N: rounding of a force computed from magnitude and direction
+# N: rounding of a force computed from magnitude and direction
+_FORCE_ROUNDING = _LIMITS["force_rounding"]
 _ONE_PUSH_ONLY = "That was more than one push. Reset, and push only once."
-_SURVIVAL_TIME = 2.0  # s that the robot must remain standing after a push
-_MAX_TOPPLING_IMPULSE = 19.2  # N·s: toppling takes 19.5 forwards, less sideways, 22.5 backwards
+_SURVIVAL_TIME = _LIMITS["survival_time"]  # s that the robot must remain standing after a push
+# N·s: toppling takes 19.5 forwards, less sideways, 22.5 backwards
+_MAX_TOPPLING_IMPULSE = _LIMITS["toppling_impulse"]
 _CHOICE_TIME = 1.0  # s that a number must be kept: a moving slider passes all of them
 
 
@@ -235,7 +242,7 @@ def _survive(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
     """Judge whether the robot survives a push of 300 N."""
     if (size := judge.largest_push) is None:
         return "Push the robot with 300 N in any direction."
-    if size < 300.0 - _FORCE_ROUNDING:
+    if size < _LIMITS["survived_push"] - _FORCE_ROUNDING:
         return f"{size:.0f} N is not enough."
     held = _time_held(judge, record, True)
     return held >= _SURVIVAL_TIME or f"Standing for {held:.1f} s."
@@ -259,7 +266,7 @@ def _on_an_edge(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
             found[name] = int(
                 np.sum(
                     cone.face_matrix @ force
-                    > -_FACET_TOLERANCE * float(force @ contacts.normals[i])
+                    > -_LIMITS["facet_tolerance"] * float(force @ contacts.normals[i])
                 )
             )
     most = max(found.values(), default=0)
@@ -297,10 +304,13 @@ def _quick_foot(judge: Judge, record: fb.Rollout, session: Session) -> bool | st
     if held == 0.0:
         del judge.memory["up"]
         return "The foot came down again."
-    if judge.memory["up"] >= 0.5:
+    if judge.memory["up"] >= _LIMITS["lifting_time"]:
         return f"Lifting took {judge.memory['up']:.2f} s. Reset, and lean first."
     judge.memory["score"] = f"{judge.memory['up']:.2f} s."
-    return held >= 1.0 or f"Lifted in {judge.memory['up']:.2f} s, in the air for {held:.1f} s."
+    return (
+        held >= _LIMITS["lifted_time"]
+        or f"Lifted in {judge.memory['up']:.2f} s, in the air for {held:.1f} s."
+    )
 
 
 def _feet_that_travel(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
@@ -334,11 +344,11 @@ def _on_ice(judge: Judge, record: fb.Rollout, session: Session) -> bool | str:
     """Judge whether the feet stay in place after a push on ice."""
     feet, size = session.sim.contact_positions(), judge.largest_push
     start = judge.memory.setdefault("feet", feet)
-    if size is None or size < 10.0 - _FORCE_ROUNDING:
+    if size is None or size < _LIMITS["ice_push"] - _FORCE_ROUNDING:
         judge.memory["feet"] = feet
         return "Push the robot with 10 N." if size is None else "Push with at least 10 N."
     moved = float(np.linalg.norm(feet - start, axis=1).max())
-    if moved > 0.01:
+    if moved > _LIMITS["ice_slip"]:
         return f"A foot has slipped by {1e3 * moved:.0f} mm. Reset."
     held = _time_held(judge, record, True)
     return (
@@ -388,64 +398,29 @@ def _toppled(judge: Judge, status: str, session: Session) -> bool | str:
     )
 
 
-_LOCKED_PHYSICS = ("mass", "actual_off", "assumed_off", "slope")
-_LOCKED_STANCE = ("com_shift", "lifted_feet", "nod", "gait", "steps_when_pushed")
-_LOCKED_QP = ("facets", "torque_fraction", "min_normal_force", "weights")
-CHALLENGES = (
+_WATCHES: dict[str, Watch] = {
+    "two_feet": _two_feet,
+    "survive": _survive,
+    "icy_slope": _icy_slope,
+    "on_an_edge": _on_an_edge,
+    "infeasible": _no_answer,
+    "quick_foot": _quick_foot,
+    "feet_that_travel": _feet_that_travel,
+    "on_ice": _on_ice,
+    "how_many_facets": _how_many_facets,
+    "topple": _topple,
+}
+_ENDS: dict[str, End] = {"infeasible": _infeasible, "topple": _toppled}
+CHALLENGES = tuple(
     Challenge(
-        "Stand on two feet",
-        "Lift FR and RL, and stand on FL and RR for one second.",
-        _two_feet, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "Survive 300 N",
-        "Push the robot with 300 N from any side. It must still be standing 2 s later.",
-        _survive, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "Down an icy slope",
-        "The ground slopes by 20° and is slippery. Press run, and slide 30 cm without falling.",
-        _icy_slope, Settings(slope=(0.0, 20.0), friction=(0.7, 0.2)),
-        locked=("mass", "actual_off", "assumed_off"), locked_actual=("slope", "friction"),
-        paused=True,
-    ),
-    Challenge(
-        "On an edge",
-        "Bring a foot's planned force onto an edge of its friction polyhedron (two active facets).",
-        _on_an_edge, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "Infeasible",
-        "Find settings for which the quadratic program is infeasible.",
-        _no_answer, locked=("actual_off", "assumed_off"), end=_infeasible,
-    ),
-    Challenge(
-        "Quick foot",
-        "Start with load on all four feet. Lift a front foot 2 cm in less than 0.5 s, and keep it "
-        "up for 1 s.",
-        _quick_foot, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "Feet that travel",
-        "Move all four feet 12 mm away from their starting points. No foot may be lifted or slip.",
-        _feet_that_travel, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "On ice",
-        "The friction coefficient is 0.05. Push with 10 N. No foot may slip 1 cm within 2 s.",
-        _on_ice, Settings(friction=(0.7, 0.05)),
-        locked=(*_LOCKED_PHYSICS, "gait"), locked_actual=("friction",),
-    ),
-    Challenge(
-        "How many facets?",
-        "Use the fewest facets with which no direction loses more than 3 % of its friction.",
-        _how_many_facets, locked=_LOCKED_PHYSICS,
-    ),
-    Challenge(
-        "The weakest side",
-        "Topple the standing robot with one push of at most 19 N·s.",
-        _topple,
-        locked=(*_LOCKED_PHYSICS, "friction", "bandwidth", *_LOCKED_STANCE, *_LOCKED_QP),
-        end=_toppled,
-    ),
-)  # fmt: skip
+        row["title"],
+        row["text"],
+        _WATCHES[row["judge"]],
+        Settings(**row.get("start", {})),
+        row["locked"],
+        row.get("locked_actual", ()),
+        _ENDS.get(row["judge"]),
+        row.get("paused", False),
+    )
+    for row in CHALLENGE_TABLE["challenges"]
+)

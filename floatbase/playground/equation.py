@@ -1,8 +1,10 @@
-"""Terms of eq. (7) in the playground: their symbols and their switches."""
+"""Terms of eq. (7) in the playground and on the live page: their symbols and their switches."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
+
+from floatbase.live.settings import TERMS
 
 
 class Term(NamedTuple):
@@ -22,6 +24,10 @@ class Term(NamedTuple):
         Option of `ModelMismatch` that switches the term; "" if a flag is not enough.
     perturbation_option : str
         Option of `Perturbation` that switches the term; "" if a flag is not enough.
+    arrow : str
+        What the arrows of the term are; "" if the viewer draws the term itself.
+    page_arrow : bool
+        Whether the live page draws these arrows, too.
     """
 
     name: str
@@ -30,6 +36,8 @@ class Term(NamedTuple):
     actual_switch: str = ""
     mismatch_option: str = ""
     perturbation_option: str = ""
+    arrow: str = ""
+    page_arrow: bool = False
 
     @property
     def switches(self) -> dict[str, str]:
@@ -38,23 +46,5 @@ class Term(NamedTuple):
         return {field: name for field, name in names.items() if name}
 
 
-EQUATION = (
-    Term("inertia", "M q̈"),
-    Term(
-        "velocity", "+ C q̇",
-        "Coriolis and centrifugal forces in the model",
-        "Coriolis and centrifugal forces in reality",
-        "velocity_forces", "velocity_forces",
-    ),
-    Term("gravity", "+ g", "gravity in the model", "gravity in reality", "gravity", "gravity"),
-    Term("zeros", "= S τ", "zeros of S in the model", "zeros of S in reality", "underactuated"),
-    Term("forces", "+ Jᵀλ", "force of one leg in the model", "force of one leg in reality"),
-    Term("drift", "J̇ q̇", "drift of the contacts in the model", "", "drift"),
-    Term(
-        "cones", "nᵀλ ≥ 0",
-        "unilateral contacts in the model",
-        "unilateral contacts in reality",
-        "cones",
-    ),
-)  # fmt: skip
+EQUATION = tuple(Term(**row) for row in TERMS)
 SYMBOLS = {term.name: term.symbol for term in EQUATION}

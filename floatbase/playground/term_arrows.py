@@ -7,6 +7,7 @@ import numpy as np
 import floatbase as fb
 from floatbase._validation import Array, as_instance, as_positive, as_string, as_strings
 from floatbase.dynamics import Contacts, equations_of_motion
+from floatbase.playground.equation import EQUATION
 from floatbase.viewer import Picture, markers, prefixed, shapes
 from floatbase.viewer.scene.colours import COM, MEASURED
 
@@ -15,12 +16,9 @@ _TEXT_SIZE = 0.06  # height of letters, as a fraction of the size of the robot
 _TORQUE_LEVER = 0.3  # m, lever arm of the force that represents a torque
 _MIN_LENGTH = 5e-3  # m: shorter arrows are not drawn
 
+_COLOURS = {"zeros": MEASURED}  # of the arrows of a term, if they differ from COM
 TERM_LEGEND = {  # term: (colour of its arrows, what they are)
-    "inertia": (COM, "m a, mass times acceleration"),
-    "velocity": (COM, "C q̇, Coriolis and centrifugal force"),
-    "gravity": (COM, "m g, weight"),
-    "zeros": (MEASURED, "τ, joint torques"),
-    "drift": (COM, "J̇ q̇, drift acceleration of the feet"),
+    term.name: (_COLOURS.get(term.name, COM), term.arrow) for term in EQUATION if term.arrow
 }
 _WORD_HEIGHTS = {
     "inertia": 0.25,

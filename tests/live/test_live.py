@@ -37,7 +37,8 @@ def test_the_control_step_compiles_to_an_equal_module(tmp_path):
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    return _compare(tmp_path_factory.mktemp("live"), wasm.MODULE)
+    folder = tmp_path_factory.mktemp("live")
+    return _compare(folder, wasm.MODULE) | {"folder": folder}
 
 
 def test_all_states_have_the_same_answers(found):
@@ -46,6 +47,15 @@ def test_all_states_have_the_same_answers(found):
     assert states["infeasible"] > 0 and states["active"] > states["states"]
     assert states["otherCode"] == 0 and states["otherActive"] == 0
     assert states["torque"] < TORQUE_TOLERANCE
+
+
+def test_a_conflict_that_the_page_names_is_one_and_needs_each_of_its_constraints(found):
+    """By linear programs on the rows of the library's QP."""
+    conflicts = found["states"]["conflicts"]
+    assert len(conflicts) == found["states"]["infeasible"]
+    assert all(conflict["unchanged"] for conflict in conflicts)
+    for can_hold, *without_one in live_reference.conflicts(found["folder"], conflicts):
+        assert not can_hold and without_one and all(without_one)
 
 
 def test_the_controller_reads_the_state_from_mujoco(found):
@@ -74,6 +84,14 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(found):
     assert refusals["tried"] > 70 and refusals["accepted"] == []
     undisturbed, disturbed = refusals["end"]
     assert disturbed == undisturbed and disturbed[-1] == ""
+
+
+def test_the_judges_of_the_page_say_what_those_of_the_library_say(found):
+    """About each slice of the same runs; every challenge of the page is won once."""
+    runs = found["challenges"]
+    assert not [run for run in runs if "difference" in run]
+    assert {run["title"] for run in runs if run["won"]} == {run["title"] for run in runs}
+    assert len({run["title"] for run in runs}) == 6 and not all(run["won"] for run in runs)
 
 
 def test_a_push_recovery_map_is_that_of_the_library(found):

@@ -12,7 +12,8 @@ def test_the_built_pages_are_up_to_date():
     digest = hashlib.sha256()
     files = (path for path in (WEB / "src").rglob("*") if path.is_file())
     sources = sorted(path.relative_to(WEB).as_posix() for path in files)
-    for name in ("build.mjs", "package-lock.json", "../../live/settings.json", *sources):
+    tables = sorted(f"../../live/{path.name}" for path in (WEB / "../../live").glob("*.json"))
+    for name in ("build.mjs", "package-lock.json", *tables, *sources):
         data = (WEB / name).read_bytes()
         digest.update(f"{name} {len(data)}\n".encode() + data)
     is_current = (pages.DIST / "sources.sha256").read_text().strip() == digest.hexdigest()

@@ -31,7 +31,9 @@ built["page.html"] = readFileSync("src/page.html", "utf8");
 const digest = createHash("sha256");
 const sources = readdirSync("src", {recursive: true, withFileTypes: true})
   .filter((entry) => entry.isFile()).map(({parentPath, name}) => `${parentPath}/${name}`).sort();
-for (const name of ["build.mjs", "package-lock.json", "../../live/settings.json", ...sources]) {
+const tables = readdirSync("../../live").filter((name) => name.endsWith(".json")).sort()
+  .map((name) => `../../live/${name}`);
+for (const name of ["build.mjs", "package-lock.json", ...tables, ...sources]) {
   const data = readFileSync(name);
   digest.update(`${name} ${data.length}\n`).update(data);
 }

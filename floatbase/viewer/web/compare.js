@@ -1,12 +1,15 @@
 // Compare the page's engine with the Python library.
 
+import {challenges, createJudge} from "./src/engine/challenges.js";
 import {createEngine} from "./src/engine/engine.js";
 import {pushRecovery} from "./src/engine/recovery.js";
 import {Refusal, defaults} from "./src/engine/settings.js";
+import {NO_ANSWER} from "./src/engine/tick.js";
+import {smallestConflict} from "./src/engine/what_if.js";
 
 const NO_FORCE = 1e-6; // N
-export const FILES = ["states.json", "runs.json", "walks.json", "recovery.json", "go2.json",
-  "solo12.json", "talos.json"];
+export const FILES = ["states.json", "runs.json", "walks.json", "recovery.json", "challenges.json",
+  "go2.json", "solo12.json", "talos.json"];
 export const NUMBERS = ["states.bin", "walks.bin"]; // of float64
 let mj = null, module = null, files = null;
 const robots = {}, engines = {};
@@ -21,7 +24,7 @@ export async function compare(given) {
   }
   const recovery = await compareRecovery();
   return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery,
-    refusals: compareRefusals()};
+    refusals: compareRefusals(), challenges: compareChallenges()};
 }
 
 const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
@@ -37,7 +40,7 @@ const outcomeOf = ({outcome}) => outcome === "infeasible" ? "controller failed"
 function compareStates() {
   const numbers = files["states.bin"];
   const found = {states: 0, otherActive: 0, otherCode: 0, infeasible: 0, active: 0, torque: 0,
-    inputs: {q: 0, v: 0}};
+    inputs: {q: 0, v: 0}, conflicts: []};
   let at = 0;
   for (const {robot: name, settings, count, lengths} of files["states.json"]) {
     const [q, v, tau, rows] = lengths.map((length) => {
@@ -53,6 +56,11 @@ function compareStates() {
     const active = [...views.result.subarray(first + nv + engine.tick.problem.k)]
       .slice(0, Math.max(0, answer)).sort((a, b) => a - b);
     found.states++;
+    if (answer === NO_ANSWER.infeasible) {
+      const rows = smallestConflict(engine.tick, robot);
+      const unchanged = engine.tick.run() === answer;
+      found.conflicts.push({state: found.states - 1, rows, unchanged});
+    }
     if (count < 0) found.infeasible++;
     else found.active += count;
     if (answer !== count) found.otherCode++;
@@ -191,6 +199,32 @@ async function compareRecovery() {
   return {pushes, python: given.pushes, resolution: given.resolution};
 }
 
+// What the judges say about the slices of the library's runs: the first difference of each run.
+function compareChallenges() {
+  return files["challenges.json"].map(({title, samples, pushes, end}) => {
+    const settings = defaults(robots.go2);
+    const challenge = challenges.find((each) => each.title === title);
+    const judge = createJudge(challenge, settings), differences = [];
+    const look = ({won, message}) => {
+      const found = judge.status;
+      if (found.isWon !== won || found.message !== message) {
+        differences.push([message, found.message]);
+      }
+    };
+    const waiting = [...pushes];
+    for (const {sample, verdict} of samples) {
+      while (waiting.length && waiting[0].start < sample.time) judge.push(waiting.shift());
+      judge.observe(sample, settings);
+      look(verdict);
+    }
+    if (end) {
+      judge.ended(end.outcome, settings);
+      look(end.verdict);
+    }
+    return {title, won: judge.status.isWon, slices: samples.length, difference: differences[0]};
+  });
+}
+
 const NO_SETTINGS = [
   null, undefined, 5, "mu", [0.5], new Map(), {hop: 1}, {constructor: 1}, {toString: "x"},
   JSON.parse('{"__proto__": {"mu": 1}}'), {mu: Infinity}, {mu: 1e308}, {mu: -0.5}, {mu: 0},
@@ -199,8 +233,9 @@ const NO_SETTINGS = [
   {facets: 5}, {facets: "4"}, {facets: "length"}, {torque: 0}, {torque: 2}, {lifted: "paw"},
   {lifted: "__proto__"}, {lifted: 0}, {gait: "hop"}, {gait: "constructor"}, {gait: "__proto__"},
   {gait: "toString"}, {gait: 1}, {gait: ""}, {gait: ["trot"]}, {speed: 50}, {turn: -Infinity},
-  {hasGravity: "no"}, {hasCoriolis: 0}, {missing: null}, {missing: "FL_foot"}, {missing: ["paw"]},
-  {missing: [null]}, {mu: 0.3, gait: "hop"}, {mu: {valueOf: 5, toString: 5}},
+  {assumedOff: "no"}, {assumedOff: 0}, {actualOff: null}, {actualOff: "gravity"},
+  {assumedOff: [null]}, {assumedOff: ["inertia"]}, {actualOff: ["drift"]}, {leg: null},
+  {leg: "paw"}, {mu: 0.3, gait: "hop"}, {mu: {valueOf: 5, toString: 5}},
   {mu: Object.create(null)},
 ];
 const NO_PUSHES = [

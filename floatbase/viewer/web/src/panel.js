@@ -119,7 +119,7 @@ export function createPanel(send) {
 
   // A term of an equation, above the picture: its symbol shows its arrows, the two boxes switch it
   // off in the controller's model and in the simulated world.
-  function toggle({name, value: first, term, part}) {
+  function toggle({name, value: first, term, part, description = name, disabled = false}) {
     const board = element("board");
     let cell = [...board.children].find(({dataset}) => dataset.term === term);
     if (!cell) {
@@ -130,7 +130,8 @@ export function createPanel(send) {
     }
     let value = first;
     const made = make("button", {
-      type: "button", className: part, textContent: part === "shown" ? term : part, title: name,
+      type: "button", className: part, textContent: part === "shown" ? term : part,
+      title: description,
     });
     const show = (now) => {
       made.setAttribute("aria-pressed", now);
@@ -140,9 +141,10 @@ export function createPanel(send) {
       show(now);
       report(name, now);
     };
-    made.setAttribute("aria-label", name);
+    made.setAttribute("aria-label", description);
+    made.setAttribute("aria-disabled", disabled); // it keeps its title and the keyboard's focus
     show(value);
-    made.onclick = () => setValue(!value);
+    if (!disabled) made.onclick = () => setValue(!value);
     cell.append(made);
     return {getValue: () => value, show, setValue};
   }

@@ -10,25 +10,23 @@ import {element, make, showNotice} from "./dom.js";
 import {createDrag} from "./drag.js";
 import {choiceRule, numberRule, rangeOf, rows} from "./engine/settings.js";
 import {readAddress} from "./live/attributes.js";
-import {controlsOf, labelOf} from "./live/controls.js";
+import {controlsOf, labelOf, settingsText} from "./live/controls.js";
+import {createFootView} from "./live/foot_view.js";
 import {createHint, triesOf} from "./live/hints.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
-import {createVoice, limitOf, multiplierText} from "./live/words.js";
+import {conflictLines, createVoice, limitOf, multiplierText} from "./live/words.js";
 import {unpack} from "./loader.js";
 import {detachGifWorker, findNode} from "./meshcat.js";
 import {startWhenSeen, watchSight} from "./visibility.js";
 
 const PLOT_PERIOD = 0.05; // s
 const TEXT_PERIOD = 250; // ms
-const MAP_SCALE = 0.5; // of a push-recovery map, times the scale of forces
 const REFUSAL_TIME = 6000; // ms for which the page shows why something was refused
 const STOOD_UP = {rank: -1, text: "The robot is on its feet again. Push it."};
 const EXPLAINED = { // texts of the panel's sections
   "model and reality": "model: what the controller assumes. reality: what the robot has.",
-  "terms of eq. (7)": "Equation (7) is M q̈ + C q̇ + g = S τ + Jᵀλ. Untick a box to leave out " +
-    "that term in the controller's model or in reality.",
 };
 const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playground, " +
   "`floatbase view talos`.";
@@ -90,23 +88,41 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   const push = {force, towards: rows.towards.first, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
   const drawMap = createRecoveryMap(scene.viewer, {
-    scale: MAP_SCALE * drawing.scale, name, say: (content) => text("map", content),
+    size: drawing.size, name, say: (content) => text("map", content),
+  });
+  const footView = createFootView(scene.viewer, robot, drawing, (foot) => {
+    send({foot});
+    scene.handle({type: "set_control_value", path: "", name: labelOf(rows.foot),
+      value: robot.points.indexOf(foot) + 1});
   });
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
 
   let gait = null;
-  const joystick = createJoystick(
-    () => robot.gaits[gait]?.most ?? [0, 0], (motion) => send({set: motion}),
-  );
+  const mostOf = (name) => robot.gaits[name]?.most ?? [0, 0];
+  const joystick = createJoystick(() => mostOf(gait), (motion) => send({set: motion}));
   element("meshcat-pane").append(joystick.box);
   // Walk with a gait, forwards at first; null: stand.
   function walk(chosen) {
-    const wasStanding = gait === null;
-    gait = chosen;
+    const [x, y] = gait === null ? [0, 0.5] : joystick.at(), [fastest, sharpest] = mostOf(chosen);
+    const motion = chosen === null ? {} : {speed: y * fastest, turn: -x * sharpest};
+    const changes = {gait: chosen, lifted: null, ...motion};
+    showGait({...frame?.settings ?? settings, ...changes});
+    send({set: changes});
+  }
+  function showGait(now) {
+    ({gait} = now);
     joystick.show(gait !== null);
-    send({set: {gait, lifted: null}});
-    if (gait !== null) joystick.move(...(wasStanding ? [0, 0.5] : joystick.at()));
+    joystick.put(now);
+  }
+  // Show settings that the page did not set itself.
+  function showSettings(now) {
+    for (const {command: {name: key}, shown} of controls) {
+      if (shown && hasPanel) {
+        scene.handle({type: "set_control_value", path: "", name: key, value: shown(now)});
+      }
+    }
+    showGait(now);
   }
   const firstGait = given.read("gait", choiceRule(Object.keys(robot.gaits))) ?? null;
   const shove = () => ({push: {force: vector(push), duration: push.duration}});
@@ -115,7 +131,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     return {pause: isNow};
   };
   const controls = controlsOf(robot, {...settings, gait: firstGait}, push, {
-    names: config.robots, name, walk, shove,
+    names: config.robots, name, walk, shove, draw: painter.show, watch: footView.watch,
     open(other) {
       given.texts.set("name", other);
       location.search = given.texts;
@@ -129,18 +145,20 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     pause: () => pause(true),
     step: () => ({...pause(true), step: true}),
     reset: () => ({reset: true}),
+    undo: () => ({undo: true}),
     reset_all() {
-      for (const {command, change} of controls.filter(({command}) => command.name !== "robot")) {
-        if (command.name !== labelOf(rows.push)) send(change(command.value) ?? {});
+      for (const {command, change, shown} of controls) {
+        if (shown || [rows.robot.name, rows.challenge.name].includes(command.name)) continue;
+        change(command.value);
         scene.handle({...command, type: "set_control_value"});
       }
-      push.force = force;
-      return {...pause(false), reset: true};
+      pushed = null;
+      return {...pause(false), resetAll: true};
     },
     map() {
       if (frame === null) return;
       const {settings: present, com} = frame;
-      drawMap({...present, lifted: null, gait: null}, com);
+      drawMap(present, settingsText(controls, present, settings), com);
     },
   };
   const presses = new Map(Object.entries(buttons).map(([key, press]) => [rows[key].name, press]));
@@ -201,6 +219,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   function draw(next) {
     frame = next;
     painter.draw(frame);
+    footView.draw(frame);
     const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
     if (dragged) painter.drawPush(dragged.world, dragged.force);
     else if (acting) painter.drawPush(placeOf(acting), acting.force);
@@ -228,7 +247,10 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     const now = performance.now();
     if (now < written + TEXT_PERIOD) return;
     written = now;
-    text("active", multiplierText(frame.active));
+    const {challenge} = frame;
+    text("challenge", challenge ? `${challenge.text}\n${challenge.message}` : "");
+    text("active", frame.conflict.length ? conflictLines(frame.conflict)
+      : multiplierText(frame.active));
     if (isPaused) return text("speed", `Paused at ${frame.time.toFixed(3)} s.`);
     const wanted = scene.controls[labelOf(rows.speed)].getValue();
     text("speed", frame.factor < SLOW * wanted
@@ -246,6 +268,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
       draw(data.frame);
       if (!isLive) announce();
     }
+    if (data.settings) showSettings(data.settings);
     if (data.stoodUp) tell(STOOD_UP, performance.now());
     if (data.isRefusal) refuse(data.error);
     else if (data.error) showNotice(data.error);

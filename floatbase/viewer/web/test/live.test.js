@@ -2,17 +2,21 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
+import {createHistory} from "../src/engine/history.js";
 import {
-  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows,
+  checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows, terms,
 } from "../src/engine/settings.js";
 import {numberOf} from "../src/controls.js";
 import {readAddress} from "../src/live/attributes.js";
 import {setParameter} from "../src/engine/tick.js";
 import {controlsOf, labelOf} from "../src/live/controls.js";
+import {footText, nearestFacet, polygon} from "../src/live/foot_view.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
-import {deal, directionText, mapText, outline} from "../src/live/recovery_map.js";
-import {createVoice, footName, jointName, limitOf, multiplierText} from "../src/live/words.js";
+import {deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
+import {
+  conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
+} from "../src/live/words.js";
 
 test("a clock gives the steps of the time that has passed, in slow motion too", () => {
   const clock = createClock(1e-3);
@@ -85,7 +89,7 @@ test("a force is inside its cone, outside, or nothing", () => {
 
 const robot = {points: ["FL_foot", "FR_foot"], weight: 100, resting: ["gripper_joint"]};
 const frameWith = (more) => ({
-  outcome: "", seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
+  outcome: "", conflict: [], seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
   measured: new Float64Array([0, 0, 50, 0, 0, 50]),
   planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
 });
@@ -113,7 +117,11 @@ test("the sentence names what limits the robot, the most important first", () =>
   assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
   assert.match(text({outcome: "fell"}), /^The robot fell/);
   assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
-  assert.match(text({outcome: "infeasible"}), /all its limits/);
+  const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
+    ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
+  assert.match(text({outcome: "infeasible", conflict}),
+    /friction of the front left foot; torque limit of the rear left calf joint and rear left hip/);
+  assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
 });
 
 test("parts have names that a reader knows", () => {
@@ -142,18 +150,19 @@ test("a control has its name, its symbol and its unit", () => {
 });
 
 test("controls begin at the settings of the engine and change what they name", () => {
-  const data = {weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}}, lifted: []};
-  const settings = defaults(data), push = {force: 30, towards: 90, duration: 0.1};
-  const points = ["left_sole_link corner 1", "left_sole_link corner 2", "right_sole_link corner 1"];
-  const chosen = [];
-  const made = Object.fromEntries(controlsOf({...data, points, lifted: points.slice(0, 1)},
-    settings, push, {names: ["go2"], name: "go2", open() {}, shove: () => ({push: push.force}),
-      walk: (gait) => { chosen.push(gait); }}).map((control) => [control.command.name, control]));
-  for (const [name, key] of [["gravity model", "hasGravity"], ["gravity reality",
-    "actualHasGravity"], ["Coriolis model", "hasCoriolis"], ["Coriolis reality",
-    "actualHasCoriolis"]]) {
-    assert.equal(made[name].command.value, settings[key]);
-    assert.deepEqual(made[name].change(false), {set: {[key]: false}});
+  const data = {
+    weight: 100, mu: 0.7, gravity: 9.81, facets: [4, 8], gaits: {trot: {}},
+    legs: ["FL_foot", "RR_foot"], points: ["FL_foot", "RR_foot"],
+  };
+  const settings = defaults({...data, legs: {FL_foot: [], RR_foot: []}});
+  const push = {force: 30, towards: 90, duration: 0.1};
+  const chosen = [], drawn = [];
+  const made = Object.fromEntries(controlsOf({...data, lifted: ["FL_foot"]}, settings, push, {
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => { chosen.push(gait); },
+    shove: () => ({push: push.force}), draw: (...term) => { drawn.push(term); },
+  }).map((control) => [control.command.name, control]));
+  for (const {command, shown} of Object.values(made)) {
+    if (shown) assert.equal(command.value, shown(settings));
   }
   for (const [name, setting] of [["friction μ model", "mu"], ["friction μ reality", "actualMu"],
     ["payload [kg] model", "payload"], ["gravity g [m/s²]", "gravity"]]) {
@@ -171,27 +180,66 @@ test("controls begin at the settings of the engine and change what they name", (
   assert.equal(made["push [N]"].change(0), undefined);
   assert.equal(push.force, 0);
   assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
-  assert.deepEqual(made.lift.change(1), {set: {lifted: points[0]}});
+  assert.deepEqual(made.lift.change(1), {set: {lifted: "FL_foot"}});
   made.gait.change(1);
   made.gait.change(0);
   assert.deepEqual(chosen, ["trot", null]);
-  const missing = made["foot without ground"];
-  assert.deepEqual(missing.change(1), {set: {missing: points.slice(0, 2)}});
-  assert.deepEqual(missing.change(0), {set: {missing: []}});
+  assert.deepEqual(made["leg of Jᵀλ"].change(1), {set: {leg: "RR_foot"}});
+  made["show gravity"].change(true);
+  assert.deepEqual(drawn, [["gravity", true]]);
+});
+
+test("the board has every term, and a switch keeps the other terms of its side", () => {
+  const page = {
+    weight: 100, facets: [4], gaits: {}, lifted: [], legs: ["FL_foot"], points: ["FL_foot"],
+  };
+  const settings = defaults({mu: 0.7, gravity: 9.81, facets: [4], legs: {FL_foot: []}});
+  const calls = {names: [], name: "", open() {}, walk() {}, draw() {}};
+  const made = controlsOf(page, settings, {}, calls).filter(({command}) => command.term);
+  const control = (name) => made.find(({command}) => command.name === name);
+  for (const term of terms) {
+    const parts = made.filter(({command}) => command.term === term.symbol)
+      .map(({command}) => command.part);
+    const expected = ["shown", ...(term.assumed_switch ? ["model"] : []),
+      ...(term.actual_switch ? ["reality"] : [])];
+    assert.deepEqual(parts, expected);
+  }
+  const inModel = control("gravity in the model");
+  assert.deepEqual(inModel.change(false), {set: {assumedOff: ["gravity"]}});
+  assert.deepEqual(control("drift of the contacts in the model").change(false),
+    {set: {assumedOff: ["gravity", "drift"]}});
+  assert.equal(inModel.shown({...settings, assumedOff: ["cones"]}), true); // after "undo"
+  assert.deepEqual(inModel.change(false), {set: {assumedOff: ["cones", "gravity"]}});
+  assert.deepEqual(control("gravity in reality").change(false), {set: {actualOff: ["gravity"]}});
+  assert.match(control("show zeros").command.description, /playground/);
+  assert.ok(control("show zeros").command.disabled && !control("show gravity").command.disabled);
+});
+
+test("undo restores the settings before a change, and a moving slider is one change", () => {
+  const history = createHistory();
+  history.remember({mu: 1}, {mu: 2}, 0);
+  history.remember({mu: 2}, {mu: 3}, 500);
+  history.remember({mu: 3}, {torque: 0.5}, 600);
+  history.remember({mu: 3, torque: 0.5}, {torque: 0.5}, 5000); // changes nothing
+  assert.deepEqual(history.undo({mu: 3, torque: 0.5}), {mu: 3});
+  assert.deepEqual(history.undo({mu: 3}), {mu: 1});
+  assert.equal(history.undo({mu: 1}), null);
 });
 
 const go2 = {
   weight: 150, points: [{name: "FL_foot"}, {name: "FR_foot"}], facets: [4, 8], bodies: [0, 1, 2],
   problems: {"all/4": {lifted: null}, "FL_foot/4": {lifted: "FL_foot"}},
   walking: {gaits: {trot: {most: [0.6, 0.8]}, walk: {most: [0.2, 0.15]}}}, mu: 0.7, gravity: 9.81,
+  legs: {FL_foot: ["FL_foot"], FR_foot: ["FR_foot"]},
 };
 
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
-    points: ["FL_foot", "FR_foot"], gaits: go2.walking.gaits};
+    legs: Object.keys(go2.legs), points: Object.keys(go2.legs), gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
     names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), shove() {},
+    draw() {}, watch() {},
   });
   const names = made.map(({command: {name, column = ""}}) => name.replace(column, "").trim());
   for (const row of Object.values(rows).filter(({low, section, places}) =>
@@ -247,6 +295,19 @@ test("a robot without gaits cannot walk", () => {
   checkSettings({gait: null, speed: 0}, {...go2, walking: null});
 });
 
+test("the polygon of a foot is that of its facets, and knows the nearest one", () => {
+  const facets = [[1, 0, -0.5], [0, 1, -0.5], [-1, 0, -0.5], [0, -1, -0.5]]; // a square
+  const corners = polygon(facets, 10);
+  for (const at of corners) for (const x of at) assert.ok(Math.abs(Math.abs(x) - 5) < 1e-9);
+  assert.equal(new Set(corners.map((at) => at.map(Math.sign).join())).size, 4);
+  const {distance, facet} = nearestFacet(facets, [1, -4, 10]);
+  assert.ok(facet === 3 && Math.abs(distance - 1) < 1e-12);
+  assert.match(footText(facets, [1, -4, 10], null, 1), /1.0 N inside .*facet 4/);
+  const worth = {now: 2, then: 1.5, cost: 0.12};
+  assert.match(footText(facets, [1, -5, 10], worth, 1), /0.50 m\/s² closer .* 2.0 .* 0.12/);
+  assert.match(footText(facets, [0, 0, 0], null, 1), /no force/);
+});
+
 test("the largest multipliers come first", () => {
   const lines = multiplierText([["friction", "FL_foot", 0, 0.1],
     ["upper torque limit", "FL_calf_joint", 0, 2]]).split("\n");
@@ -272,19 +333,21 @@ test("a search finds the largest number that passes, wherever it begins", () => 
   assert.ok(largest(() => true, 30, 30, 100) > 100);
 });
 
-test("a direction has the angle of the slider and words", () => {
-  const words = [0, 30, 90, 150, 180, 225, 270, 340]
-    .map((degrees) => directionText(degrees * Math.PI / 180));
-  assert.deepEqual(words, ["0° (forwards)", "30° (forwards left)", "90° (left)",
-    "150° (backwards left)", "180° (backwards)", "-135° (backwards right)", "-90° (right)",
-    "-20° (forwards)"]);
-});
-
 test("a map grows around its centre and closes when it is complete", () => {
   const found = [{direction: Math.PI / 2, push: 20}, {direction: 0, push: 10}];
   const points = outline(found, [1, 1], 0.1, false);
   assert.deepEqual(points[0].slice(0, 2), [2, 1]);
   assert.ok(Math.abs(points[1][1] - 3) < 1e-12);
   assert.equal(outline(found, [1, 1], 0.1, true).length, 3);
-  assert.match(mapText(found, 1), /10 N towards 0° \(forwards\), at most 20 N towards 90° \(left/);
+  assert.match(mapText(found, "standing", 1), /from 10 N \(forwards\) to 20 N \(left\)/);
+  const ways = [-170, -90, -20, 30, 180].map((degrees) => wayOf((degrees + 360) * Math.PI / 180));
+  assert.deepEqual(ways, ["backwards", "right", "forwards", "forwards left", "backwards"]);
+});
+
+test("a few round rings measure every push", () => {
+  for (const most of [1, 3, 7, 24, 40, 41, 99, 100, 255, 260, 1900]) {
+    const rings = ringsFor(most);
+    assert.ok(rings.length >= 1 && rings.length <= 4, `${most}: ${rings}`);
+    assert.ok(rings.at(-1) <= most && most < 2 * rings.at(-1) + 1, `${most}: ${rings}`);
+  }
 });

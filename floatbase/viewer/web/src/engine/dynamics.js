@@ -1,13 +1,16 @@
 // The robot's state in MuJoCo and in Pinocchio's form, which the control step takes: there, the
 // base's linear velocity is expressed in the base frame.
 
+export const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+
 // Write MuJoCo's bias forces of the state in `data` into `result`, with or without those that
-// depend on the velocity. The positions in `data` must be up to date.
-export function biasForces(mj, model, data, result, hasCoriolis) {
+// depend on the velocity, and those that give the acceleration in `data`. The positions in `data`
+// must be up to date.
+export function biasForces(mj, model, data, result, hasCoriolis, hasAcceleration = false) {
   const velocity = hasCoriolis ? null : data.qvel.slice();
   if (velocity) data.qvel.fill(0);
   mj.mj_comVel(model, data);
-  mj.mj_rne(model, data, 0, result);
+  mj.mj_rne(model, data, Number(hasAcceleration), result);
   if (velocity) data.qvel.set(velocity);
 }
 

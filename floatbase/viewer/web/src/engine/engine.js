@@ -1,11 +1,12 @@
 // A robot with its controller in MuJoCo: one control step per millisecond. Deterministic: the same
 // settings and pushes give the same run. It needs neither a page nor a clock.
 
-import {readState} from "./dynamics.js";
-import {contactForces, makeModel} from "./model.js";
+import {cross, readState} from "./dynamics.js";
+import {contactForces, makeModel, touchingPoints} from "./model.js";
 import {checkPush, checkSettings, defaults} from "./settings.js";
 import {NO_ANSWER, createTick, setParameter} from "./tick.js";
 import {createWalk} from "./walk.js";
+import {frictionValue, smallestConflict} from "./what_if.js";
 
 export const STEP = 1e-3; // s
 const REST = 1.5; // s that a fallen robot lies before it is put on its feet again
@@ -27,6 +28,8 @@ export function createEngine(mj, module, robot) {
   let target = [0, 0, 0], shift = [0, 0, 0]; // m, of the centre of mass from its place at rest
   let stance = {lifted: null, since: 0, lower: 0}; // the foot that is in the air
   let walk = null, gait = null; // the plan of a walk, and the gait that it follows or null
+  let conflict = []; // constraints that cannot hold together, after the controller has stopped
+  let motors = null; // wrench of the base's motors, or none
   let startHeight = 0, startAxis = [0, 0, 1], qpos = null, qvel = null, ctrl = null;
 
   // MuJoCo's memory may move when it grows; views into it are then empty.
@@ -39,8 +42,16 @@ export function createEngine(mj, module, robot) {
     setParameter(views.floats, parameters.mu, settings.mu);
     setParameter(views.floats, parameters.torque, settings.torque);
     views.floats[parameters.baseMass] = assumed.baseMass + settings.payload;
-    views.floats[parameters.gravity] = settings.hasGravity ? -settings.gravity : 0;
-    views.floats[parameters.velocityForces] = Number(settings.hasCoriolis);
+    const {flags, legs} = tick.problem, has = (term) => !settings.assumedOff.includes(term);
+    views.floats[parameters.gravity] = has("gravity") ? -settings.gravity : 0;
+    views.floats[parameters.velocityForces] = Number(has("velocity"));
+    views.floats[parameters.drift] = Number(has("drift"));
+    views.sizes[flags.underactuated] = BigInt(has("zeros"));
+    views.sizes[flags.cones] = BigInt(has("cones"));
+    if (!has("forces") && settings.leg in legs) { // a foot in the air has no force
+      views.sizes[flags.sameRows] = 0n;
+      views.ints[legs[settings.leg]] = 1n;
+    }
     if (walk === null) placeTargets();
   }
   function placeTargets() {
@@ -51,11 +62,12 @@ export function createEngine(mj, module, robot) {
     }
   }
   function apply() {
-    const {gravity, payload, actualPayload, actualHasGravity} = settings;
-    assumed.change({payload, gravity});
-    actual.change({payload: actualPayload, gravity: actualHasGravity ? gravity : 0});
-    actual.setMissing(settings.missing);
-    if (settings.actualHasCoriolis) actual.data.qfrc_applied.fill(0);
+    const {gravity, payload, actualPayload, assumedOff, actualOff} = settings;
+    assumed.change({payload, gravity: assumedOff.includes("gravity") ? 0 : gravity});
+    actual.change(
+      {payload: actualPayload, gravity: actualOff.includes("gravity") ? 0 : gravity},
+    );
+    actual.setMissing(actualOff.includes("forces") ? robot.legs[settings.leg] : []);
     actual.setFriction(settings.actualMu);
     actual.setTorque(settings.torque);
     select();
@@ -68,7 +80,7 @@ export function createEngine(mj, module, robot) {
     qpos.set(robot.home.qpos);
     mj.mj_forward(actual.model, actual.data);
     pushes = [];
-    [outcome, active, steps, offAt] = ["", 0, 0, -1];
+    [outcome, active, steps, offAt, motors, conflict] = ["", 0, 0, -1, null, []];
     stance = {lifted: null, since: 0, lower: 0};
     [walk, gait] = [null, null];
     [target, shift] = [[0, 0, 0], [0, 0, 0]];
@@ -155,6 +167,7 @@ export function createEngine(mj, module, robot) {
   }
 
   function command() {
+    motors = null;
     const {time} = actual.data; // the plans of `Walk` use the same sum of steps
     followGait(time);
     if (walk === null && (moveFeet() | moveTargets())) placeTargets();
@@ -163,12 +176,26 @@ export function createEngine(mj, module, robot) {
     readAssumed();
     if (walk !== null) moveWalk(time);
     active = tick.run();
+    if (active === NO_ANSWER.infeasible) conflict = smallestConflict(tick, robot);
     if (active < 0) return stop(active === NO_ANSWER.infeasible ? "infeasible" : "no answer");
     for (let i = 0; i < d; i++) ctrl[robot.motors[i]] = views.result[nv + i];
+    if (settings.actualOff.includes("zeros")) motors = baseWrench();
+  }
+  // What the base's motors do: the rest of (7) in the base's rows, as the controller assumes it.
+  function baseWrench() {
+    const {assumedOff, leg} = settings, {points: names} = tick.problem, {result, v} = views;
+    const ignored = assumedOff.includes("forces") ? robot.legs[leg] : [];
+    const forces = points.filter(({name}) => names.includes(name) && !ignored.includes(name))
+      .map(({name, geom, radius}) => {
+        const [x, y, z] = assumed.data.geom_xpos.subarray(3 * geom, 3 * geom + 3);
+        const first = nv + d + 3 * names.indexOf(name);
+        return {at: [x, y, z - radius], force: result.subarray(first, first + 3)};
+      });
+    return assumed.baseWrench(result, v, forces, !assumedOff.includes("velocity"));
   }
   // The controller ends; the joints are damped, and the robot comes to lie on its links.
   function stop(why) {
-    outcome = why;
+    [outcome, motors] = [why, null];
     offAt = steps;
     actual.setHulls(true);
     damp();
@@ -177,9 +204,21 @@ export function createEngine(mj, module, robot) {
     const {motors, damping, qvelOfV} = robot;
     for (let i = 0; i < d; i++) ctrl[motors[i]] = -damping[i] * qvel[qvelOfV[6 + i]];
   }
-  function applyPushes() {
+  // Add a force f on a body, at a point r from its centre of mass, both in the world frame.
+  function addForce(body, r, f) {
     const forces = actual.data.xfrc_applied;
-    forces.fill(0);
+    [...f, ...cross(r, f)].forEach((x, i) => { forces[6 * body + i] += x; });
+  }
+  const adhesion = () => settings.actualOff.includes("cones") ? Math.round(robot.weight) : 0; // N
+  function applyAdhesion() {
+    const {geom_xpos: places, xipos} = actual.data, {geom_bodyid: bodyOf} = actual.model;
+    for (const {geom} of touchingPoints(mj, actual, robot)) {
+      const body = bodyOf[geom];
+      const r = [0, 1, 2].map((i) => places[3 * geom + i] - xipos[3 * body + i]);
+      addForce(body, r, [0, 0, -adhesion()]);
+    }
+  }
+  function applyPushes() {
     const time = steps * STEP;
     for (const {body, at, force, start, duration} of pushes) {
       const share = (Math.min(start + duration, time + STEP) - Math.max(start, time)) / STEP;
@@ -187,9 +226,7 @@ export function createEngine(mj, module, robot) {
       const {xpos, xmat, xipos} = actual.data, f = force.map((x) => share * x);
       const r = [0, 1, 2].map((i) => xpos[3 * body + i] - xipos[3 * body + i]
         + [0, 1, 2].reduce((sum, c) => sum + xmat[9 * body + 3 * i + c] * at[c], 0));
-      const moment = [r[1] * f[2] - r[2] * f[1], r[2] * f[0] - r[0] * f[2],
-        r[0] * f[1] - r[1] * f[0]];
-      [...f, ...moment].forEach((x, i) => { forces[6 * body + i] += x; });
+      addForce(body, r, f);
     }
     pushes = pushes.filter(({start, duration}) => start + duration > time);
   }
@@ -213,6 +250,7 @@ export function createEngine(mj, module, robot) {
     // "" while the controller runs, then why it stopped: "fell", "left the ground",
     // "infeasible", "no answer"
     get outcome() { return outcome; },
+    get conflict() { return conflict; },
     get pushes() { return pushes; },
     get walk() { return walk; },
     // Names of the feet in the air.
@@ -238,10 +276,13 @@ export function createEngine(mj, module, robot) {
       if (qpos.length === 0) refresh();
       if (outcome === "") command();
       else damp();
+      const {xfrc_applied: forces, qfrc_applied: applied} = actual.data;
+      forces.fill(0);
+      applied.fill(0);
       applyPushes();
-      if (!settings.actualHasCoriolis) {
-        actual.data.qfrc_applied.set(actual.coriolisCompensation());
-      }
+      if (adhesion() > 0) applyAdhesion();
+      if (settings.actualOff.includes("velocity")) applied.set(actual.coriolisCompensation());
+      motors?.forEach((x, i) => { applied[i] += x; });
       mj.mj_step(actual.model, actual.data);
       steps++;
       if (outcome === "" && isAirborne()) stop("left the ground");
@@ -250,8 +291,12 @@ export function createEngine(mj, module, robot) {
     },
     // Whether a robot that fell has lain long enough.
     get isAtRest() { return offAt >= 0 && (steps - offAt) * STEP > REST; },
+    comVelocity() {
+      mj.mj_subtreeVel(actual.model, actual.data);
+      return [...actual.data.subtree_linvel.subarray(3 * base, 3 * base + 3)];
+    },
     com: () => [...actual.data.subtree_com.subarray(3 * base, 3 * base + 3)],
-    measuredForces: () => contactForces(mj, actual, robot, buffer),
+    measuredForces: () => contactForces(mj, actual, robot, buffer, adhesion()),
     // Planned forces of all contact points, zero for those of a lifted foot.
     plannedForces() {
       const forces = new Float64Array(3 * points.length);
@@ -263,6 +308,17 @@ export function createEngine(mj, module, robot) {
       return forces;
     },
     torques: () => [...views.result.subarray(nv, nv + d)],
+    // The facets of each friction cone as the controller assumes them: a row times a force is at
+    // most zero inside.
+    facets() {
+      const first = tick.problem.parameters.cones;
+      return Array.from({length: settings.facets},
+        (_, i) => [...views.floats.subarray(first + 5 * i, first + 5 * i + 3)]);
+    },
+    // What more friction at a contact point would bring, see what_if.js.
+    frictionValue(name) {
+      return outcome === "" ? frictionValue(tick, robot, name, this.activeConstraints()) : null;
+    },
     // Active constraints: [kind, owner, number, multiplier].
     activeConstraints() {
       if (outcome !== "" || active <= 0) return [];

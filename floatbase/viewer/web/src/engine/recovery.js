@@ -4,6 +4,7 @@
 import {STEP, createEngine} from "./engine.js";
 
 const START = 0.2; // s before the push
+const SETTLED = 2; // s before it, if the robot first has to walk, lift a foot or move
 const OBSERVED = 1.5; // s after it
 const MOST = 100; // times the weight: a larger push shows that it does not act
 
@@ -47,8 +48,10 @@ function survives(engine, settings, {direction, duration, size}) {
   engine.set(settings);
   engine.reset();
   const force = [size * Math.cos(direction), size * Math.sin(direction), 0];
-  engine.push({force, start: START, duration}, Infinity);
-  const steps = Math.ceil((START + duration + OBSERVED) / STEP - 1e-9);
+  const {gait, lifted, forward, left, height} = engine.settings;
+  const start = gait || lifted || forward || left || height ? SETTLED : START;
+  engine.push({force, start, duration}, Infinity);
+  const steps = Math.ceil((start + duration + OBSERVED) / STEP - 1e-9);
   for (let i = 0; i < steps; i++) if (engine.step() !== "") return false;
   return true;
 }

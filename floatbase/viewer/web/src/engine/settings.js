@@ -1,6 +1,7 @@
 // Which settings and pushes of a live robot are valid. The ranges are those of its controls, in
-// floatbase/live/settings.json.
+// floatbase/live/settings.json. The terms of eq. (7) are those of floatbase/live/equation.json.
 
+import terms from "../../../../live/equation.json" with {type: "json"};
 import rows from "../../../../live/settings.json" with {type: "json"};
 
 const WEIGHT_PER_MASS = 9.81; // m/s²
@@ -8,16 +9,16 @@ const FARTHEST = 10; // m: where a push can act, from the middle of a body
 const MOST_SHOWN = 40; // characters of a value in a message
 const ROUNDING = 1e-9; // of a vector that was made from its length and direction
 
-export {rows};
+export {rows, terms};
 
-// The default settings of the engine. Friction, payload and each term of eq. (7) have two values:
-// the one that the controller assumes, and the actual one.
+// The default settings of the engine. Friction, payload and the terms of eq. (7) that are switched
+// off have two values: the one that the controller assumes, and the actual one.
 export const defaults = (robot) => ({
   mu: robot.mu, actualMu: robot.mu, payload: 0, actualPayload: 0, gravity: robot.gravity,
   height: 0, forward: 0, left: 0, facets: robot.facets[0], torque: 1, lifted: null,
   gait: null, speed: 0, turn: 0, // m/s and rad/s
-  hasGravity: true, actualHasGravity: true, hasCoriolis: true, actualHasCoriolis: true,
-  missing: [], // contact points that pass through the ground
+  assumedOff: [], actualOff: [], // names of terms
+  leg: Object.keys(robot.legs)[0], // whose force the term "forces" switches off
 });
 
 // A value or a message that makes no sense; the text says why.
@@ -45,6 +46,13 @@ export const choiceRule = (values) => ({
   words: values.length ? `one of ${values.map(String).join(", ")}` : "left out for this robot",
   fits: (value) => values.includes(value),
 });
+const termsRule = (part) => {
+  const names = terms.filter((term) => term[part]).map(({name}) => name);
+  return {
+    words: `a list of terms (${names.join(", ")})`,
+    fits: (value) => Array.isArray(value) && value.every((name) => names.includes(name)),
+  };
+};
 export const SWITCH = {words: "true or false", fits: (value) => typeof value === "boolean"};
 const vectorRule = (most) => ({
   words: `a vector of three numbers${most < Infinity ? `, of at most ${most}` : ""}`,
@@ -91,7 +99,7 @@ export function checkSettings(changes, robot) {
     const {low, high} = rangeOf(key, robot), {scale = 1} = rows[key];
     return numberRule(low * scale, high * scale);
   };
-  const gaits = robot.walking?.gaits ?? {}, points = robot.points.map(({name}) => name);
+  const gaits = robot.walking?.gaits ?? {};
   const fastest = [0, 1].map((i) => Math.max(0, ...Object.values(gaits).map(({most}) => most[i])));
   checkEach(changes, {
     mu: row("friction"), actualMu: row("friction"),
@@ -101,11 +109,8 @@ export function checkSettings(changes, robot) {
     lifted: choiceRule([null, ...liftedFeet(robot)]),
     gait: choiceRule([null, ...Object.keys(gaits)]),
     speed: numberRule(-fastest[0], fastest[0]), turn: numberRule(-fastest[1], fastest[1]),
-    hasGravity: SWITCH, actualHasGravity: SWITCH, hasCoriolis: SWITCH, actualHasCoriolis: SWITCH,
-    missing: {
-      words: `a list of contact points (${points.join(", ")})`,
-      fits: (value) => Array.isArray(value) && value.every((name) => points.includes(name)),
-    },
+    assumedOff: termsRule("assumed_switch"), actualOff: termsRule("actual_switch"),
+    leg: choiceRule(Object.keys(robot.legs)),
   }, "change of the settings");
 }
 

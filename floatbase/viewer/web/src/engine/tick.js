@@ -9,6 +9,7 @@ const ARGUMENTS = [
 const TARGET_ARGUMENTS = ["com", "comVelocity", "body", "pieces", "swings", "inputs"];
 const MOST_PIECES = 16, MOST_SWINGS = 4; // of a plan
 const INTEGERS = new Set(["sizes", "ints", "intWork"]);
+const PROBED = ["inputs", "sizes", "ints", "floats", "result"];
 const N_STAGES = 5n;
 const ITEM = 8; // bytes of a number
 const PAGE = 65536; // bytes of a page of memory
@@ -111,6 +112,15 @@ export function createTick(module, robot) {
       views.inputs.set(problem.inputs);
       args = [returned, exception, ...ARGUMENTS.flatMap((name) => array(name, [sizeOf(name)])),
         N_STAGES];
+    },
+    // Call call(), which may change `views` and run the step. Afterwards they are as before.
+    probe(call) {
+      const kept = PROBED.map((name) => [name, views[name].slice()]);
+      try {
+        return call();
+      } finally {
+        for (const [name, values] of kept) views[name].set(values);
+      }
     },
     // Compute the command for the present contents of `views`. Returns the number of active
     // constraints, or one of NO_ANSWER.

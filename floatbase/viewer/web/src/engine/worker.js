@@ -1,21 +1,30 @@
 // The worker of a page with a live robot: it holds the engine, and steps it when the page asks for
 // a picture. A page that draws nothing lets the robot rest.
 //
-// From the page: {start}, {set}, {push}, {reset}, {pause}, {step}, {timeScale}, {frame},
-// {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp}, {recovery}, {error}. An error with
-// `isRefusal` says why a message makes no sense; then nothing has changed.
+// From the page: {start}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset}, {pause},
+// {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp},
+// {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
+// with `isRefusal` says why a message makes no sense; then nothing has changed.
 
-import {createEngine, STEP} from "./engine.js";
+import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
 import {slippingPoints} from "./contacts.js";
+import {createEngine, STEP} from "./engine.js";
+import {createHistory} from "./history.js";
 import {pushRecovery} from "./recovery.js";
-import {Refusal, SWITCH, check, checkNames, liftedFeet, numberRule} from "./settings.js";
+import {
+  Refusal, SWITCH, check, checkNames, choiceRule, defaults, liftedFeet, numberRule,
+} from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
 let mj = null, module = null, robot = null, engine = null, stop = false;
 let resting = []; // joints that are at the end of their range when the robot stands
 let around = null; // names of the contact points, and the weight
-const clock = createClock(STEP);
+const clock = createClock(STEP), history = createHistory();
+let first = null; // the settings of "reset everything"
+let challenge = null, judge = null; // what is to be solved, or null, and who watches
+let foot = null; // the contact point whose force the page explains
+let motion = null; // of the centre of mass at the last picture: {time, velocity, acceleration}
 // constraints that were active, and contact points that slipped, since the last picture
 const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
@@ -53,9 +62,9 @@ async function start({name, settings}) {
     }
   }
   resting = [...standing];
-  engine.set(settings);
-  engine.reset();
-  slipTime = null;
+  first = {...defaults(robot), ...settings};
+  restart(first);
+  history.clear();
   clock.reset();
   const {drawing, weight} = robot;
   around = {weight, points: robot.points.map(({name}) => name)};
@@ -65,8 +74,20 @@ async function start({name, settings}) {
 const summary = () => ({
   ...around, bodies: robot.bodies,
   facets: robot.facets, lifted: liftedFeet(robot),
-  gaits: robot.walking?.gaits ?? {}, resting,
+  gaits: robot.walking?.gaits ?? {}, legs: Object.keys(robot.legs), resting,
 });
+
+function restart(settings = {}) {
+  engine.set(settings);
+  engine.reset();
+  slipTime = null;
+  judge = challenge && createJudge(challenge, first);
+}
+function change(settings) {
+  const before = engine.settings;
+  engine.set(settings);
+  history.remember(before, settings, performance.now());
+}
 
 function frame() {
   const isPushed = engine.pushes.some(({start: begins}) => begins <= engine.time);
@@ -77,32 +98,59 @@ function frame() {
   slipping.clear();
   for (; done < count; done++) {
     if (engine.isAtRest) {
-      engine.reset();
-      slipTime = null;
+      const before = judge;
+      restart();
+      if (before?.status.isWon) judge = before; // it stays solved
       postMessage({stoodUp: true});
     }
+    const wasRunning = engine.outcome === "";
     engine.step();
+    if (wasRunning && engine.outcome !== "") judge?.ended(engine.outcome, engine.settings);
     for (const one of engine.activeConstraints()) seen.set(one.slice(0, 3).join(), one);
     if (done % SAMPLE < SAMPLE - 1) continue;
-    watchSlip();
+    watch(SAMPLE);
     if (performance.now() - begin > clock.budget) {
       done++;
       break;
     }
   }
-  if (done % SAMPLE > 0) watchSlip(); // a picture in slow motion has few steps
+  if (done % SAMPLE > 0) watch(done % SAMPLE); // a picture in slow motion has few steps
   clock.done(done, performance.now() - begin);
   postMessage({frame: picture()});
 }
 
-function watchSlip() {
+function watch(steps) {
   if (engine.outcome !== "") return;
+  judge?.observe(sampleOf(engine, robot, steps * STEP), engine.settings);
   const forces = {measured: engine.measuredForces(), planned: engine.plannedForces()};
   for (const name of slippingPoints({...forces, settings: engine.settings}, around)) {
     slipping.add(name);
   }
   if (slipping.size) slipTime = engine.time;
   else if (engine.time - slipTime > RECENT) slipTime = null;
+}
+
+// The forces that are drawn for terms of eq. (7), N: {term: {at, force}}.
+function termForces() {
+  const {actualOff: off} = engine.settings, base = robot.bodies[1];
+  const {data, model} = engine.actual, mass = model.body_subtreemass[base], com = engine.com();
+  const {time} = engine, velocity = engine.comVelocity();
+  if (motion === null || time < motion.time) motion = {time, velocity, acceleration: [0, 0, 0]};
+  if (time > motion.time) { // else the robot is paused
+    const elapsed = time - motion.time;
+    const acceleration = velocity.map((x, i) => (x - motion.velocity[i]) / elapsed);
+    motion = {time, velocity, acceleration};
+  }
+  const weight = [0, 0, off.includes("gravity") ? 0 : -mass * engine.settings.gravity];
+  return {
+    inertia: {at: com, force: motion.acceleration.map((x) => mass * x)},
+    velocity: {
+      at: [...data.xpos.subarray(3 * base, 3 * base + 3)],
+      force: off.includes("velocity") ? [0, 0, 0]
+        : [...engine.actual.coriolisCompensation().subarray(0, 3)],
+    },
+    gravity: {at: com, force: weight, endsThere: true}, // the ground is below it
+  };
 }
 
 // What the page draws of the present state.
@@ -119,11 +167,14 @@ function picture() {
     places[3 * geom], places[3 * geom + 1], places[3 * geom + 2] - radius,
   ]);
   return {
-    rotations, positions, contacts, com: engine.com(), time: engine.time,
+    rotations, positions, contacts, com: engine.com(), time: engine.time, terms: termForces(),
+    facets: engine.facets(), conflict: engine.conflict,
+    foot: foot && {name: foot, ...engine.frictionValue(foot)},
     measured: engine.measuredForces(), planned: engine.plannedForces(),
     active: engine.activeConstraints(), seen: [...seen.values()], slipping: [...slipping],
     hasSlipped: slipTime !== null,
     outcome: engine.outcome, pushes: engine.pushes,
+    challenge: judge?.status ?? null,
     lifted: engine.lifted, settings: engine.settings, factor: clock.factor,
     stepTime: clock.stepTime,
   };
@@ -131,12 +182,39 @@ function picture() {
 
 const handlers = {
   start: (given) => start(given),
-  set: (changes) => engine?.set(changes),
-  push: (push) => engine?.push(push),
-  reset() {
-    engine?.reset();
-    slipTime = null;
+  set: (changes) => engine && change(changes),
+  undo() {
+    const before = engine && history.undo(engine.settings);
+    if (!before) return;
+    engine.set(before);
+    postMessage({settings: engine.settings});
   },
+  resetAll() {
+    if (!engine) return;
+    change(first);
+    restart();
+    clock.setScale(1);
+    postMessage({settings: engine.settings});
+  },
+  push(push) {
+    engine?.push(push);
+    judge?.push(push);
+  },
+  // Watch the force at a contact point, or at none: null.
+  foot(name) {
+    check("foot", name, choiceRule([null, ...around.points]));
+    foot = name;
+  },
+  // Start a challenge by its title, or return to free play: null.
+  challenge(title) {
+    check("challenge", title, choiceRule([null, ...challenges.map((each) => each.title)]));
+    challenge = challenges.find((each) => each.title === title) ?? null;
+    first = {...defaults(robot), ...challenge && startOf(challenge)};
+    history.clear();
+    restart(first);
+    postMessage({settings: engine.settings});
+  },
+  reset: () => engine && restart(),
   pause(isPaused) {
     check("pause", isPaused, SWITCH);
     clock.pause(isPaused);

@@ -15,7 +15,7 @@ export const triesOf = (robot) => [
     : []),
   ...(robot.lifted.length ? ["“lift” a foot: the robot moves its mass over the others first."]
     : []),
-  "Leave out “gravity” in the “model”: the robot sags.",
+  "Switch off “model” below “+ g” at the top: the robot sags.",
   "Lower the “torque limits” until a motor is named above.",
   "Set “gravity” to 1.6 m/s², as on the Moon, and push again.",
 ];

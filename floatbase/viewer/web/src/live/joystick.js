@@ -35,11 +35,16 @@ export function createJoystick(most, change) {
     "velocity: arrow keys up and down for the speed, left and right to turn, Escape to stop");
   const box = make("div", {className: "joystick", hidden: true}, pad, text);
   let at = [0, 0];
-  function move(x, y) {
-    at = [within(x), within(y)];
+  // Show a velocity.
+  function put({speed, turn}) {
+    const [fastest, sharpest] = most();
+    at = [within(-turn / (sharpest || 1)), within(speed / (fastest || 1))];
     knob.style.transform = `translate(${at[0] * 32}px, ${-at[1] * 32}px)`;
-    const [speed, turn] = most(), now = {speed: at[1] * speed, turn: -at[0] * turn};
-    text.textContent = motionText(now.speed, now.turn);
+    text.textContent = motionText(speed, turn);
+  }
+  function move(x, y) {
+    const [speed, turn] = most(), now = {speed: within(y) * speed, turn: -within(x) * turn};
+    put(now);
     change(now);
   }
   function follow({clientX, clientY}) {
@@ -63,7 +68,7 @@ export function createJoystick(most, change) {
   return {
     box,
     show(isShown) { box.hidden = !isShown; },
-    move,
+    put,
     at: () => at,
   };
 }

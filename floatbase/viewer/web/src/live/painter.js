@@ -1,5 +1,8 @@
 // Draws a live robot: it moves, colours, shows and hides the items of its scene.
 
+import {cross} from "../engine/dynamics.js";
+import {SHOWN_AT_FIRST} from "./controls.js";
+
 // m: matrix of an arrow from `start` along `vector`, column by column. wide: factor of its width.
 export function arrowMatrix(start, vector, {size, slenderness, arrowLength}, wide = 1) {
   const length = Math.max(Math.hypot(...vector), 1e-9), z = vector.map((x) => x / length);
@@ -11,9 +14,6 @@ export function arrowMatrix(start, vector, {size, slenderness, arrowLength}, wid
     ...x.map((c) => c * half), 0, ...y.map((c) => c * half), 0, ...vector, 0, ...start, 1,
   ];
 }
-const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
-];
 const unit = (a) => a.map((c) => c / Math.hypot(...a));
 const scaled = ([x, y, z], [sx, sy, sz]) => [sx, 0, 0, 0, 0, sy, 0, 0, 0, 0, sz, 0, x, y, z, 1];
 
@@ -40,6 +40,7 @@ export function createPainter(scene, drawing, robot) {
     scene.handle({type: "set_property", path: path(item), property, value});
   }
   const {links, points, scale, coneHeight, patchRadius, leastForce} = drawing;
+  const shown = new Set(SHOWN_AT_FIRST); // terms of eq. (7)
 
   function drawLinks({rotations: R, positions: p}) {
     for (const [joint, item] of links) {
@@ -51,7 +52,8 @@ export function createPainter(scene, drawing, robot) {
     }
   }
   function drawForce(kind, i, at, force, wide) {
-    const item = `${kind}/${points[i]}`, isShown = Math.hypot(...force) > leastForce;
+    const item = `${kind}/${points[i]}`;
+    const isShown = shown.has("forces") && Math.hypot(...force) > leastForce;
     set(item, "visible", isShown);
     if (!isShown) return;
     place(item, arrowMatrix(at, force.map((x) => scale * x), drawing, wide));
@@ -72,7 +74,8 @@ export function createPainter(scene, drawing, robot) {
     const status = coneStatus(measured, actualMu, leastForce);
     const matrix = scaled(ground, [mu * coneHeight, mu * coneHeight, coneHeight]);
     for (const count of robot.facets) {
-      const isShown = count === facets && !isLifted, sides = `cone/${name}/${count}/sides`;
+      const isShown = shown.has("cones") && count === facets && !isLifted;
+      const sides = `cone/${name}/${count}/sides`;
       set(sides, "visible", isShown);
       for (let facet = 0; facet < count; facet++) {
         const item = `cone/${name}/${count}/facet ${facet}`;
@@ -84,6 +87,17 @@ export function createPainter(scene, drawing, robot) {
       set(sides, "color", drawing.coneColours[status]);
       place(sides, matrix);
     }
+  }
+  // The arrow of a term of eq. (7) with its name at the tip.
+  function drawTerm(term, {at, force, endsThere}) {
+    const isShown = shown.has(term) && Math.hypot(...force) > leastForce;
+    for (const kind of ["term", "word"]) set(`${kind}/${term}`, "visible", isShown);
+    if (!isShown) return;
+    const vector = force.map((x) => scale * x);
+    const start = endsThere ? at.map((x, i) => x - vector[i]) : at;
+    place(`term/${term}`, arrowMatrix(start, vector, drawing));
+    const [x, y, z] = at.map((c, i) => c + (endsThere ? 0 : vector[i]));
+    place(`word/${term}`, scaled([x, y + 0.2 * drawing.size, z + 0.2 * drawing.size], [1, 1, 1]));
   }
   let middle = [0, 0];
   function drawGround([x, y]) {
@@ -99,11 +113,14 @@ export function createPainter(scene, drawing, robot) {
     place("com/projection", scaled([x, y, 0], [0.8 * r, 0.8 * r, 0.12 * r]));
   }
   return {
+    // Draw a term of eq. (7), or not, from the next picture on.
+    show(term, isShown) { shown[isShown ? "add" : "delete"](term); },
     draw(frame) {
       drawLinks(frame);
       points.forEach((_, i) => drawContact(i, frame));
       drawCom(frame.com);
       drawGround(frame.com);
+      for (const [term, force] of Object.entries(frame.terms)) drawTerm(term, force);
     },
     // The push of `force`, N, as an arrow that begins where it acts, or none.
     drawPush(at, force) {

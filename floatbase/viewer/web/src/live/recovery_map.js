@@ -1,13 +1,17 @@
 // A push-recovery map for the present settings: the largest push that the robot survives in each
-// direction, computed by a few workers and drawn on the ground as it grows. The map before it stays
-// visible in grey.
+// direction, computed by a few workers and drawn on the ground as it grows, with rings that have
+// numbers. The map before it stays visible in grey. Labels say what each of them is.
 
+import {toCode} from "../colours.js";
 import {three} from "../meshcat.js";
 
 const DIRECTIONS = 16, DURATION = 0.1, RESOLUTION = 5; // -, s, N: those of `fb.push_recovery`
 const FEWEST_WORKERS = 2, MOST_WORKERS = 4;
 const HEIGHT = 0.004; // m above the ground
-const NOW = 0x0072b2, BEFORE = 0x888888;
+const NOW = 0x0072b2, BEFORE = 0x777777, RING = 0xbbbbbb;
+const MOST_RINGS = 4, CORNERS = 64; // of a circle
+const LETTERS = 0.05; // height of a label, times the robot's size
+const RADIUS = 0.75; // of the largest push, times the robot's size: it fits the picture
 
 // Angles of the directions, rad, an arc for each worker, which begins each search at the result of
 // its neighbour: [[direction, …], …].
@@ -33,67 +37,122 @@ export function outline(found, centre, scale, isComplete) {
 const WAYS = ["forwards", "forwards left", "left", "backwards left", "backwards", "backwards right",
   "right", "forwards right"];
 
-// "45° (forwards left)": an angle between -180 and 180°, as the slider has it, and its direction.
-export function directionText(angle) {
-  const degrees = Math.round(angle * 180 / Math.PI), way = WAYS[Math.round(degrees / 45) % 8];
-  return `${degrees > 180 ? degrees - 360 : degrees}° (${way})`;
+// "forwards left": the direction of an angle, rad.
+export const wayOf = (angle) => WAYS[Math.round(angle * 4 / Math.PI) % 8];
+
+// The forces of the rings up to `most`, N: multiples of 1, 2 or 5 times a power of ten.
+export function ringsFor(most) {
+  const power = 10 ** Math.floor(Math.log10(most / MOST_RINGS));
+  const step = power * [1, 2, 5, 10].find((factor) => factor * power * MOST_RINGS >= most);
+  return Array.from({length: Math.floor(most / step)}, (_, i) => (i + 1) * step);
 }
 
-export function mapText(found, seconds) {
-  if (!found.length) return "Computing the push-recovery map of the standing robot.";
-  const sorted = [...found].sort((a, b) => a.push - b.push), [least, most] = [sorted[0],
-    sorted.at(-1)];
+// The extremes of a map in words. what: such as "trot, 0.30 m/s".
+export function mapText(found, what, seconds) {
+  if (!found.length) return `Computing the push-recovery map: ${what}.`;
+  const sorted = [...found].sort((a, b) => a.push - b.push);
   const state = found.length < DIRECTIONS ? `${found.length} of ${DIRECTIONS} directions`
     : `${DIRECTIONS} directions in ${seconds.toFixed(1)} s`;
-  const [weak, strong] = [least, most].map(
-    ({push, direction}) => `${push} N towards ${directionText(direction)}`,
+  const [weak, strong] = [sorted[0], sorted.at(-1)].map(
+    ({push, direction}) => `${push} N (${wayOf(direction)})`,
   );
-  return `Largest push of ${DURATION} s that the standing robot survives: at least ${weak}, ` +
-    `at most ${strong} (${state}).`;
+  return `Largest push of ${DURATION} s that the robot survives (${what}): from ${weak} to ` +
+    `${strong}, ${state}.`;
 }
 
-// viewer: meshcat's. say(text): writes a text into the panel. name: of the robot.
-export function createRecoveryMap(viewer, {scale, name, say}) {
-  let workers = [], shown = null, before = null;
-  function line(colour) {
-    const {BufferGeometry, Line, LineBasicMaterial} = three();
-    const made = new Line(new BufferGeometry(), new LineBasicMaterial({color: colour}));
+// viewer: meshcat's. size: of the robot, m. say(text): writes a text into the panel. name: of the
+// robot.
+export function createRecoveryMap(viewer, {size, name, say}) {
+  let workers = [], drawn = [];
+  const maps = []; // the present one first
+  function line(colour, points = []) {
+    const {BufferGeometry, Line, LineBasicMaterial, Vector3} = three();
+    const vectors = points.map((point) => new Vector3(...point));
+    const made = new Line(new BufferGeometry().setFromPoints(vectors),
+      new LineBasicMaterial({color: colour}));
     made.frustumCulled = false;
-    viewer.scene.add(made);
+    return made;
+  }
+  // The inside of a map.
+  function area(colour, points, centre) {
+    const {DoubleSide, Mesh, MeshBasicMaterial, Shape, ShapeGeometry, Vector2} = three();
+    const corners = points.map(([x, y]) => new Vector2(x - centre[0], y - centre[1]));
+    const made = new Mesh(new ShapeGeometry(new Shape(corners)), new MeshBasicMaterial(
+      {color: colour, transparent: true, opacity: 0.25, side: DoubleSide, depthWrite: false},
+    ));
+    made.position.set(centre[0], centre[1], HEIGHT);
+    return made;
+  }
+  // Text that faces the viewer.
+  function label(text, at, colour = "#222") {
+    const {CanvasTexture, Sprite, SpriteMaterial} = three();
+    const canvas = document.createElement("canvas"), font = "32px system-ui, sans-serif";
+    let pen = canvas.getContext("2d");
+    pen.font = font;
+    Object.assign(canvas, {width: pen.measureText(text).width + 20, height: 48});
+    pen = canvas.getContext("2d");
+    pen.fillStyle = "#ffffffe0";
+    pen.fillRect(0, 0, canvas.width, canvas.height);
+    pen.fillStyle = colour;
+    pen.font = font;
+    pen.textAlign = "center";
+    pen.fillText(text, canvas.width / 2, 36);
+    const made = new Sprite(new SpriteMaterial(
+      {map: new CanvasTexture(canvas), depthTest: false},
+    ));
+    made.position.set(...at);
+    made.scale.set(LETTERS * size * canvas.width / canvas.height, LETTERS * size, 1);
     return made;
   }
   function remove(one) {
-    if (one === null) return;
     viewer.scene.remove(one);
+    one.material.map?.dispose();
     one.geometry.dispose();
     one.material.dispose();
+  }
+  // Draw all maps and their rings with one scale, which fits the largest push.
+  function draw() {
+    const most = Math.max(1, ...maps.flatMap(({found}) => found.map(({push}) => push)));
+    const forces = ringsFor(most), scale = RADIUS * size / most, {centre} = maps[0];
+    drawn.forEach(remove);
+    drawn = forces.flatMap((force) => {
+      const points = Array.from({length: CORNERS + 1}, (_, i) => (
+        {direction: 2 * Math.PI * i / CORNERS, push: force}));
+      const at = [centre[0], centre[1] + scale * force, HEIGHT + 0.03 * size];
+      return [line(RING, outline(points, centre, scale, false)), label(`${force} N`, at)];
+    });
+    maps.forEach(({found, what}, i) => {
+      const colour = i ? BEFORE : NOW, points = outline(found, centre, scale,
+        found.length === DIRECTIONS), away = centre[1] + (1.15 + 0.45 * i) * RADIUS * size;
+      if (found.length > 2) drawn.push(line(colour, points), area(colour, points, centre));
+      drawn.push(label(`largest push survived: ${what}`, [centre[0], away, HEIGHT],
+        toCode(colour)));
+    });
+    for (const one of drawn) viewer.scene.add(one);
+    viewer.set_dirty();
   }
   function end() {
     for (const worker of workers) worker.terminate();
     workers = [];
   }
-  // settings: those of the page. centre: below the robot, [x, y].
-  return function start(settings, centre) {
+  // settings: those of the page. what: what is special about them. centre: below the robot, [x, y].
+  return function start(settings, what, centre) {
     end();
-    remove(before);
-    before = shown;
-    before?.material.color.setHex(BEFORE);
-    shown = line(NOW);
-    const {Vector3} = three(), found = [], begun = performance.now(), mine = shown;
+    const mine = {found: [], what, centre}, begun = performance.now();
+    maps.splice(1);
+    maps.unshift(mine);
     const free = (navigator.hardwareConcurrency || 2) - 1; // one core draws
     const count = Math.max(FEWEST_WORKERS, Math.min(MOST_WORKERS, free));
-    say(mapText(found, 0));
+    say(mapText(mine.found, what, 0));
+    draw();
     workers = deal(DIRECTIONS, count).map((directions) => {
       const worker = new Worker("engine.js", {type: "module"});
       worker.onmessage = ({data}) => {
         if (data.error) return say(data.error);
-        found.push(data.recovery);
-        const isComplete = found.length === DIRECTIONS;
-        const points = outline(found, centre, scale, isComplete);
-        mine.geometry.setFromPoints(points.map((point) => new Vector3(...point)));
-        viewer.set_dirty();
-        say(mapText(found, (performance.now() - begun) / 1000));
-        if (isComplete) end();
+        mine.found.push(data.recovery);
+        draw();
+        say(mapText(mine.found, what, (performance.now() - begun) / 1000));
+        if (mine.found.length === DIRECTIONS) end();
       };
       worker.postMessage({recovery: {
         name, settings, directions, duration: DURATION, resolution: RESOLUTION,

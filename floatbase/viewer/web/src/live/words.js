@@ -14,6 +14,12 @@ export function footName(name) {
   return human ? `${human} foot` : name;
 }
 
+// "left_sole_link corner 1" -> "left foot, corner 2": the name of a contact point.
+export function pointName(name) {
+  const [, corner] = / corner (\d+)$/.exec(name) ?? [];
+  return corner ? `${footName(name)}, corner ${Number(corner) + 1}` : footName(name);
+}
+
 // "FL_calf_joint" -> "front left calf joint", "leg_left_4_joint" -> "leg left 4 joint".
 export function jointName(name) {
   const [, end, side, rest] = /^([FRH])([LR])_(.+?)(?:_joint)?$/.exec(name) ?? [];
@@ -38,18 +44,43 @@ function subject(names) {
 const STOPPED = {
   fell: "The robot fell. It will be back on its feet in a moment.",
   "left the ground": "The robot left the ground. It will be back on its feet in a moment.",
-  infeasible: "Too much: no motor torques can keep the robot within all its limits. It will be " +
-    "back on its feet in a moment.",
-  "no answer": "The controller found no solution here. The robot will be back on its feet in a " +
-    "moment.",
+  "no answer": "The controller of this page has no answer in this state. The Python library " +
+    "has a slower method for it. The robot will be back on its feet in a moment.",
 };
+
+const kindOf = ([kind]) => kind.replace(/^(upper|lower) /, "");
+const ownerOf = ([kind, owner]) => (kind.includes("joint") || kind.includes("torque")
+  ? jointName(owner) : footName(owner));
+
+// What stopped a controller without an answer. conflict: [kind, owner, number], see what_if.js.
+function conflictText(conflict) {
+  const kinds = [...new Set(conflict.map(kindOf))].map((kind) => {
+    const owners = conflict.filter((one) => kindOf(one) === kind).map(ownerOf);
+    return `${kind} of the ${list(owners)}`;
+  });
+  return `Too much: these constraints cannot hold together: ${kinds.join("; ")}. ` +
+    "The robot will be back on its feet in a moment.";
+}
+
+// The conflict in full, a line for each kind.
+export function conflictLines(conflict) {
+  const kinds = [...new Set(conflict.map(([kind]) => kind))].map((kind) => {
+    const those = conflict.filter((one) => one[0] === kind);
+    const names = those.map((one) => (
+      kind === "friction" ? `${ownerOf(one)} (facet ${one[2] + 1})` : ownerOf(one)));
+    return `${those.length} × ${kind}: ${names.join(", ")}`;
+  });
+  return ["In conflict. Without any one of these constraints, the others can hold:", ...kinds]
+    .join("\n");
+}
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
 // sends. robot: its summary.
 export function limitOf(frame, robot) {
   if (frame.outcome) {
     const before = frame.hasSlipped ? "The feet slipped. " : "";
-    return {rank: 0, text: before + (STOPPED[frame.outcome] ?? frame.outcome)};
+    const text = frame.conflict.length ? conflictText(frame.conflict) : STOPPED[frame.outcome];
+    return {rank: 0, text: before + (text ?? frame.outcome)};
   }
   if (isInAir(frame, robot)) {
     return {rank: 1, text: "The robot is in the air: the ground exerts no force on its feet."};
@@ -109,8 +140,7 @@ export function multiplierText(all) {
   const active = all.filter(([, , , multiplier]) => multiplier > WEAK);
   if (!active.length) return "No active constraints.";
   const lines = active.map(([kind, owner, number, value]) => {
-    const name = kind.includes("torque") || kind.includes("joint") ? jointName(owner)
-      : footName(owner);
+    const name = ownerOf([kind, owner]);
     const facet = kind === "friction" ? ` (facet ${number + 1})` : "";
     return {value, text: `${kind}${facet}, ${name}: ${value.toPrecision(2)}`};
   });
