@@ -69,6 +69,7 @@ export function createJoystick(most, change) {
     box,
     show(isShown) { box.hidden = !isShown; },
     put,
+    move,
     at: () => at,
   };
 }
