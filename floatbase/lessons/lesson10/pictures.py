@@ -66,4 +66,4 @@ def as_svg(figure: Figure) -> str:
     """Return a figure as text, for the note of a slider."""
     drawn = StringIO()
     figure.savefig(drawn, format="svg")
-    return drawn.getvalue().partition("<svg")[2].join(("<svg", ""))
+    return "<svg" + drawn.getvalue().partition("<svg")[2]
