@@ -56,7 +56,7 @@ def plot_curves(
     for (label, (times, values)), (style, colour) in zip(curves.items(), _LOOKS, strict=False):
         ax.plot(times, values, style, color=hex_code(colour), label=label)
     ax.set(xlabel="time [s]", ylabel=ylabel, ylim=lim)
-    ax.legend(loc="lower left", fontsize="small", ncols=2)
+    ax.legend(fontsize="small")
     ax.grid(alpha=0.3)
     plt.close(figure)
     return figure
@@ -66,4 +66,5 @@ def as_svg(figure: Figure) -> str:
     """Return a figure as text, for the note of a slider."""
     drawn = StringIO()
     figure.savefig(drawn, format="svg")
-    return "<svg" + drawn.getvalue().partition("<svg")[2]
+    narrow = '<svg style="max-width: 100%; height: auto"'  # for a narrow page
+    return narrow + drawn.getvalue().partition("<svg")[2]
