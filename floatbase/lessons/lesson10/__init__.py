@@ -9,4 +9,4 @@ from floatbase.lessons.lesson10.helpers import (
     mean_load,
     plan_pendulum,
 )
-from floatbase.lessons.lesson10.pictures import as_svg, plot_curves, plot_stances, plot_step
+from floatbase.lessons.lesson10.pictures import as_svg, plot_curves, plot_stances

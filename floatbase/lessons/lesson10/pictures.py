@@ -1,4 +1,4 @@
-"""Lesson 10: a pendulum that takes a step, the stances of gaits, and curves over time."""
+"""Lesson 10: the stances of gaits, and curves over time."""
 
 from __future__ import annotations
 
@@ -14,21 +14,6 @@ from floatbase.behaviours import Gait
 from floatbase.viewer.scene.colours import COM, GREYS, LIMIT, MEASURED, hex_code
 
 _LOOKS = ("-", GREYS[0]), ("--", MEASURED), (":", COM), ("-.", LIMIT)
-
-
-def plot_step(paths: Mapping[str, npt.ArrayLike], reach: float) -> Figure:
-    """Plot pendulums that take a step of 0.3 m after 1 s."""
-    figure, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
-    for foot, times in ((0.0, (0.0, 1.0)), (0.3, (1.0, 2.0))):
-        ax.fill_between(times, foot - reach, foot + reach, color=hex_code(GREYS[2]), alpha=0.4)
-    for (label, path), (style, _) in zip(paths.items(), _LOOKS, strict=False):
-        t, c, p = np.asarray(path, dtype=np.float64).T
-        ax.plot(t, c, style, color=hex_code(GREYS[0]), linewidth=2, label=f"c, {label}")
-        ax.plot(t, p, style, color=hex_code(GREYS[1]), linewidth=1, label=f"p, {label}")
-    ax.set(xlabel="time [s]", ylabel="forwards [m]", ylim=(-0.2, 0.45))
-    ax.legend(loc="upper left", fontsize="small")
-    plt.close(figure)
-    return figure
 
 
 def plot_stances(gaits: Mapping[str, Gait], seconds: float) -> Figure:
