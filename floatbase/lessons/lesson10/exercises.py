@@ -31,17 +31,24 @@ def _plan(**parts: Any) -> Array:
 
 
 def _plan_mistakes() -> list[Mistake]:
-    growth = np.exp(pendulum_rate() * INTERVAL)
+    n, growth = len(_MIDDLES), np.exp(pendulum_rate() * INTERVAL)
+    alone = growth**n * (_STATE[0] + _STATE[1] / pendulum_rate())  # ξ at the end with p = 0
+    late = (1.0 - growth) * growth ** np.arange(n, 0.0, -1.0)
     return [
-        ("near_zero", _plan(near=np.zeros(len(_MIDDLES))), "Each p must be near the middle of its "
-         "own foot, not near zero."),
+        ("near_zero", _plan(near=np.zeros(n)), "Each p must be near the middle of its own foot, "
+         "not near zero."),
         ("middles_only", _MIDDLES, "These are the middles of the feet. Where is ξ at the end?"),
-        ("not_carried", _plan(weights=np.full(len(_MIDDLES), 1.0 - growth)), "An early p moves "
-         "the body in all later intervals: A multiplies its effect in each of them."),
+        ("not_carried", _plan(weights=np.full(n, 1.0 - growth)), "An early p moves the body in "
+         "all later intervals: A multiplies its effect in each of them."),
+        ("too_early", _plan(weights=late), "A multiplies the effect of an earlier p. Add B for "
+         "the p of an interval after this."),
         ("first_foot", _plan(goal=_MIDDLES[0]), "At the end, ξ must be above the last foot of the "
          "horizon, not the first."),
         ("no_state", _plan(alone=0.0), "The state x is missing. Where does it go if p is zero?"),
-        ("reversed", _plan()[::-1], "The order of p is reversed."),
+        ("one_side", _plan(alone=0.0, goal=(_MIDDLES[-1] - alone) / 100.0), "The weight 100 "
+         "multiplies both sides of its row, so the goal as well."),
+        ("clipped", np.clip(_plan(), _MIDDLES - REACH, _MIDDLES + REACH), "Do not limit p here: "
+         "run_pendulum does."),
         ("light", _plan(end_weight=1.0), "ξ is too far from the last foot. Its row in the "
          "least-squares problem has the weight 100."),
     ]  # fmt: skip
@@ -84,7 +91,9 @@ def _horizon_mistakes() -> list[Mistake]:
     return [
         ("zero", 0, "There is no answer yet. How far must ξ be ahead at the step?"),
         ("last_begins", n - 1, "The horizon must contain one interval *after* the step."),
-        ("milliseconds", 20 * (n - 1), "That is a time in ms. How many intervals of 20 ms?"),
+        ("not_smallest", n + 1, "It survives, but there is a smaller number."),
+        ("milliseconds", round(1e3 * np.log(STEP / REACH) / pendulum_rate()),
+         "That is a time in ms. How many intervals of 20 ms?"),
         ("middle", _intervals(STEP), "ξ need not be above the middle of the new foot. p reaches "
          "5 cm to each side."),
         ("feet_overlap", _intervals(STEP - 2 * REACH), "That is the distance between the two feet. "
