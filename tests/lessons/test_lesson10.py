@@ -32,6 +32,30 @@ def test_a_step_of_20_cm_needs_a_horizon_of_14_intervals(n, survives):
     assert (abs(x[0] - 0.2) < 0.05) == survives
 
 
+def mpc(gait, velocity, **options):
+    robot = judges.load("go2")
+    contacts = fb.Contacts.points(robot, mu=0.7)
+    return MPC(robot, contacts, gait, (velocity, 0.0), acceleration=(2, 1), **options)
+
+
+@pytest.mark.front_end
+@pytest.mark.parametrize(("n", "bounce"), [(1, False), (1, True), (3, False), (10, False)])
+def test_a_long_flight_needs_a_horizon(n, bounce):
+    gait = Gait.flying_trot(judges.load("go2"), stance=0.1, flight=0.12, start=0.2)
+    run = run_go2(mpc(gait, 1.0, n=n, bounce=bounce), 2.6)
+    assert run.outcome == ("fell" if n == 1 else "completed")
+
+
+@pytest.mark.front_end
+def test_a_push_moves_the_body_by_the_time_that_is_looked_ahead_not_by_the_intervals():
+    gait = Gait.trot(judges.load("go2"), start=0.2)
+    moved = [
+        run_go2(mpc(gait, 0.3, n=n, dt=dt, solve_period=0.01), 1.8, [0, 200, 0], 0.6).com[-1, 1]
+        for n, dt in ((10, 0.01), (3, 0.03), (10, 0.03))
+    ]
+    assert abs(moved[0] - moved[1]) < 0.06 < abs(moved[0] - moved[2])
+
+
 @pytest.mark.front_end
 @pytest.mark.parametrize("n", [1, 10])
 def test_no_horizon_survives_a_push_if_footholds_cannot_change(n):
