@@ -24,7 +24,7 @@ GENERAL = {"no_answer", "not_numbers", "not_finite", "no_cost", "no_least_point"
 # passed other conditions
 GUARDS = {
     "03": {"pulls"}, "05": {"slips"},
-    "09": {"in_the_air", "beyond"}, "10": {"falls"}, "C": {"empty"}, "P": {"short"},
+    "09": {"in_the_air", "beyond"}, "C": {"empty"}, "P": {"short"},
 }  # fmt: skip
 
 
