@@ -112,20 +112,7 @@ def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> V
 
 
 def stabilization_panel(distances: Callable[[float], Array], timestep: float) -> SliderPanel:
-    """Return a panel with a slider for Baumgarte's α: how far the worst foot is from its pin.
-
-    Parameters
-    ----------
-    distances : callable
-        Function of α [1/s] that returns the distance of the worst foot after each step [mm].
-    timestep : float
-        Length of a step [s].
-
-    Returns
-    -------
-    SliderPanel
-        The panel.
-    """
+    """Return a panel with a slider for α: distances(α) of the worst foot from its pin [mm]."""
     without = distances(0.0)
     wide, high, top = 420, 180, 1.1 * without.max()  # px, px, mm
 
@@ -139,11 +126,11 @@ def stabilization_panel(distances: Callable[[float], Array], timestep: float) ->
         drawn = svg.line((0, high), (wide, high)) + svg.line((0, 0), (0, high))
         drawn += curve(without, stroke=hex_code(GREYS[2]), stroke_dasharray="6 4")
         drawn += curve(distance, stroke="currentColor", stroke_width=2)
-        words = f"up to {top:.1f} mm, over 0.2 s; dashed: α = 0"
-        note = f"α dt = {α * timestep:.2f}: the worst foot is {distance[-1]:.2g} mm from its pin"
+        words = f"distance of the worst foot, up to {top:.0f} mm, in 0.2 s; dashed: α = 0"
+        note = f"α dt = {α * timestep:.2f}: {distance[-1]:.2g} mm at the end"
         return svg.captioned(drawn, (wide, high), 10, words, note)
 
-    return slider_panel(None, draw, α=(0.0, 50.0, 220.0, "1/s"))
+    return slider_panel(None, draw, α=(0.0, 50.0, 210.0, "1/s"))
 
 
 def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:
