@@ -54,7 +54,7 @@ def shoved_go2() -> Rollout:
     robot = fb.load("go2")
     tasks = fb.standing_tasks(robot.standing())
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
-    push = fb.Push([0.0, 150.0, 0.0], start=0.05, duration=0.1, frame="FL_hip")
+    push = fb.Push(np.array([0.0, 150.0, 0.0]), start=0.05, duration=0.1, frame="FL_hip")
     return fb.rollout(fb.Simulation(robot), controller, 0.35, [push])
 
 
