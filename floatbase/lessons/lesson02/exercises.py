@@ -8,6 +8,7 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
+from floatbase.dynamics import PointContact
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     NO_ANSWER,
@@ -16,18 +17,12 @@ from floatbase.lessons.judges import (
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_judge,
+    array_or_verdict,
     first_fault,
     format_vector,
 )
 from floatbase.lessons.lesson02.helpers import RECORD_ROW, shoved_go2
 from floatbase.lessons.lesson03 import standing_go2_eom
-
-
-def _inverse_dynamics(state: fb.State, later: fb.State, forces: Array) -> list[Array]:
-    """Return M q̈, h and Jᵀ λ of go2 at the first of two states a millisecond apart."""
-    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
-    return [eom.M @ (later.v - state.v) / 1e-3, eom.h, eom.J.T @ forces]
 
 
 def _recorded_rows() -> Array:
@@ -38,23 +33,22 @@ def _recorded_rows() -> Array:
 def _row_mistakes() -> list[Mistake]:
     record, i = shoved_go2(), RECORD_ROW
     state, forces = record.state(i), record.measured[i]
-    inertial, bias, contact = _inverse_dynamics(state, record.state(i + 1), forces)
-    at_ball = sum(
-        state.frame_jacobian(foot.frame)[:3].T @ force
-        for foot, force in zip(state.robot.feet, forces.reshape(4, 3), strict=True)
-    )
+    inertial = state.M @ (record.v[i + 1] - record.v[i]) / 1e-3
+    bias, contact = state.h, fb.Contacts.points(state.robot).jacobian(state).T @ forces
+    balls = fb.Contacts([PointContact(foot.frame) for foot in state.robot.feet])
     return [
         ("no_forces", inertial + bias, "This is inverse dynamics of a robot that touches nothing. "
          "Its base rows are what the ground supplies. Which term of (4) is missing?"),
         ("sign_of_forces", inertial + bias + contact, "The base rows show twice what the ground "
          "supplies. On which side of (4) is Jᵀ λ?"),
-        ("at_rest", bias - contact, "Without M q̈, the base rows are not zero: this robot "
-         "accelerates."),
+        ("at_rest", bias - contact, "Without M q̈, this is a robot that does not accelerate."),
+        *(("other_rows", state.M @ (record.v[j] - record.v[i - 1]) / dt + bias - contact,
+         "The forces of row 300 act from row 300 to row 301. Which two velocities belong to them?")
+          for j, dt in ((i, 1e-3), (i + 1, 2e-3))),
         ("no_h", inertial - contact, "The third row is minus the weight. Which term of (4) "
          "contains gravity?"),
-        ("at_ball", inertial + bias - at_ball, "The forces are zero, but the moments are not: "
-         "these forces act at the middle of each foot. They act 2 cm below, where the foot touches "
-         "the ground, as in `fb.equations_of_motion`."),
+        ("at_ball", inertial + bias - balls.jacobian(state).T @ forces, "The moments are not zero: "
+         "these forces act at the middle of each foot. They act where it touches the ground."),
     ]  # fmt: skip
 
 
@@ -86,10 +80,14 @@ ERROR_JUDGE = NumericJudge(
 )
 
 
-@array_judge((4,))
-def _judge_fault(answer: Array) -> Verdict:
-    """Judge the line that is wrong, and by how much [m/s²]."""
-    line = answer[0]
+def _judge_fault(answer: Any) -> Verdict:
+    """Judge the line that is wrong, and by how much [m/s²]: four numbers, or one and a vector."""
+    if isinstance(answer, (tuple, list)) and len(answer) == 2:
+        answer = [answer[0], *np.ravel(answer[1])]
+    given = array_or_verdict(answer, (4,))
+    if isinstance(given, Verdict):
+        return given
+    line = given[0]
     return first_fault([
         ("no_line", line not in (1, 2, 3, 4), "The first number is the number of the wrong line, "
          "from 1 to 4."),
@@ -99,7 +97,7 @@ def _judge_fault(answer: Array) -> Verdict:
          "have wrong moments. The moment rows are almost zero."),
         ("line_4", line == 4, "A wrong sign or place of the forces would show in the vertical row "
          "or in the moments, also at 0 ms. There, all rows are zero."),
-    ]) or ERROR_JUDGE(answer[1:])  # fmt: skip
+    ]) or ERROR_JUDGE(given[1:])  # fmt: skip
 
 
 def _faults() -> list[Example]:
@@ -107,7 +105,7 @@ def _faults() -> list[Example]:
     lines = ((0, "no_line"), (2, "line_2"), (3, "line_3"), (4, "line_4"))
     return [
         *((np.array([1, *error]), hint) for error, hint in ERROR_JUDGE.examples()),
-        *((np.array([line, *_error_of_line()]), hint) for line, hint in lines),
+        *(((line, _error_of_line()), hint) for line, hint in lines),
     ]
 
 
