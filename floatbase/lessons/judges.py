@@ -299,9 +299,9 @@ class BugHunt:
 
     def __call__(self, answer: Any) -> Verdict:
         """Judge an answer."""
-        if answer is None or answer is Ellipsis or answer == ["", ""]:
+        parts = list(answer) if isinstance(answer, list | tuple) else []
+        if answer is None or answer is Ellipsis or parts == ["", ""]:
             return NO_ANSWER
-        parts = answer if isinstance(answer, list | tuple) else ()
         if len(parts) != 2 or not all(isinstance(part, str | int) for part in parts):
             text = 'The answer must be the line and the kind of the fault, such as ["1", "sign"].'
             return Verdict(False, text, "form")

@@ -8,4 +8,4 @@ from floatbase.lessons.lesson07.helpers import (
     median_time_ms,
     run_with_push,
 )
-from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot, plot_ways_out

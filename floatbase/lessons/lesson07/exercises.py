@@ -174,12 +174,12 @@ EXERCISES = (
             praise="J takes joint velocities to foot velocities. Forces go back through Jᵀ. In a "
             "robot with as many motors as force components, the wrong matrix has the right shape.",
             refuted={
-                "sign": "With a wrong sign, each entry of the first table would equal the "
-                "second. The entries are in other places.",
-                "frame": "In another frame, the columns of the first table would be combinations "
-                "of the right ones. Here the numbers themselves are right.",
-                "missing term": "Without forces the torques are right, so M and h are complete. "
-                "And the numbers of the first table are all there.",
+                "sign": "With a wrong sign, each entry would be the negative of the one by virtual "
+                "work. The same numbers are there, in other places.",
+                "frame": "In another frame, the numbers would be combinations of the right ones. "
+                "Here the numbers themselves are right.",
+                "missing term": "Without forces the torques are right, so h is there. And all "
+                "numbers of virtual work are there.",
             },
             elsewhere="Without forces the torques are right. Which line has the forces?",
         ),
