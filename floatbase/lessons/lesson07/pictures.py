@@ -54,7 +54,8 @@ def plot_ways_out(
     lists: dict[float, Any] = {w: [goal, *tasks] for w, goal in goals.items()}
     lists[0.0] = [[goals[10.0]], list(tasks)]  # the hierarchy
     missed = {w: abs((J @ controller.replace(tasks=t)(q, v).qdd)[1] - 2) for w, t in lists.items()}
-    ranked.axhline(max(missed.pop(0.0), 1e-7), color=light, linestyle="--", label="hierarchy")
+    none = max(missed.pop(0.0), 1e-7)
+    ranked.axhline(none, color=light, linestyle="--", label="hierarchy, at most")
     ranked.loglog(list(missed), list(missed.values()), "o-", color=dark, label="one list of tasks")
     ranked.set(xlabel="weight of the first task", ylabel="missed [m/s²]")
     ranked.legend()
