@@ -47,9 +47,8 @@ def test_the_centre_of_mass_is_that_of_the_state_in_the_frame_of_the_base():
 
 
 @pytest.mark.front_end
-@pytest.mark.parametrize("shift", [0.0, -0.019])  # m: then the feet carry equal loads
-def test_go2_is_weakest_forwards_and_aside_also_with_equal_loads(shift):
-    goal = state_with_moved_body(GO2.standing(), [shift, 0.0, 0.0])
+def test_go2_is_weakest_forwards_and_aside_also_with_equal_loads():
+    goal = state_with_moved_body(GO2.standing(), [-0.019, 0.0, 0.0])  # m
     ways = {"forwards, aside": (1.0, 1.0), "aside": (0.0, 1.0), "backwards, aside": (-1.0, 1.0)}
     outcomes = {}
     for name, way in ways.items():
