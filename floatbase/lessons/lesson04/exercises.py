@@ -180,8 +180,8 @@ EXERCISES = (
             praise="The residual subtracts world axes from base axes. They agree only as long as "
             "the robot faces forwards.",
             refuted={
-                "sign": "With a wrong sign, go2 would accelerate the other way at every heading. At "
-                "0° the result is right.",
+                "sign": "With a wrong sign, go2 would accelerate the other way at every heading. "
+                "At 0° the result is right.",
                 "transpose": "Rᵀ does take a vector from world axes to base axes. Does everything "
                 "in the residual go there?",
                 "missing term": "A missing term would change the magnitude. It is 0.5 m/s² at "
