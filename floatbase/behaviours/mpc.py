@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from floatbase._validation import Array, as_array, as_instance, as_integer, as_positive
+from floatbase._validation import Array, as_array, as_bool, as_instance, as_integer, as_positive
 from floatbase.behaviours.horizon import (
     COM,
     OMEGA,
@@ -72,6 +72,8 @@ class MPC(Walk):
         Time between two solutions, at most `dt` [s]. A change of stance also needs a new solution.
     state_weights : array_like, shape (12,), optional
         Weights of `HorizonQP`.
+    bounce : bool, optional
+        Whether the reference of a gait with flight bounces; otherwise it is level.
     ramp : float, optional
         As for `Walk` [s]; 0 by default, because the horizon loads the feet.
     **options : object
@@ -89,7 +91,9 @@ class MPC(Walk):
     The horizon is that of [DiCarlo2018]_. As in [Kim2019]_, a whole-body controller follows its
     forces. The horizon tracks the pendulum of `Walk`, which also adjusts the footholds. In a gait
     with flight, the pendulum's zero-moment point moves along the path, because a robot in the air
-    has none.
+    has none. The reference of its height is given in closed form: a parabola in each flight, and a
+    constant vertical acceleration in each stance. With ``bounce=False``, only the horizon knows
+    that the robot will be in the air.
 
     Examples
     --------
@@ -118,6 +122,7 @@ class MPC(Walk):
         dt: float = 0.03,
         solve_period: float = 0.02,
         state_weights: npt.ArrayLike = STATE_WEIGHTS,
+        bounce: bool = True,
         ramp: float = 0.0,
         **options: Any,
     ):
@@ -132,6 +137,7 @@ class MPC(Walk):
         self._dt = as_positive("dt", dt, "s", maximum=1.0)
         self._solve_period = as_positive("solve_period", solve_period, "s", maximum=self._dt)
         self._state_weights = as_array("state_weights", state_weights, (12,))
+        self._bounces = as_bool("bounce", bounce)
         gains = options.get("gains")
         gains = Gains() if gains is None else as_instance("gains", gains, Gains)
         self._force_weight = _FORCE_FRACTION * gains.com[1] / robot.mass**2
@@ -252,7 +258,7 @@ class MPC(Walk):
         last one, the reference is level.
         """
         flight, gravity = self._flight, self.robot.gravity
-        if flight is None or self._progress.clock.gait.stop is not None:
+        if not self._bounces or flight is None or self._progress.clock.gait.stop is not None:
             return 0.0, 0.0
         begin, T, interval = flight
         stance = interval - T

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -171,8 +171,6 @@ _GENERAL = {
     "transpose": "This is the transpose of the answer.",
     "unknown": "This is not right, and it is not a mistake that this check recognises. Check "
     "the units, then read the statement again.",
-    "unknown_count": "This is not right, and it is not a mistake that this check recognises. "
-    "What is counted? Is anything left out or counted twice?",
 }
 
 
@@ -197,15 +195,12 @@ class NumericJudge:
     tolerance : float, optional
         Relative tolerance: two values are equal if they differ by at most this fraction of the
         largest entry of the right value [-].
-    is_count : bool, optional
-        Whether the answer is a count, which has neither a sign nor a unit.
     """
 
     right: Callable[[], Any]
     praise: str
     mistakes: Callable[[], Iterable[Mistake]] = tuple
     tolerance: float = 1e-3
-    is_count: bool = False
 
     def __call__(self, answer: Any) -> Verdict:
         """Judge an answer."""
@@ -228,8 +223,6 @@ class NumericJudge:
 
     def _of_any_answer(self, given: Array, right: Array) -> str:
         """Return the general hint, a key of `_GENERAL`, for a wrong answer of no known kind."""
-        if self.is_count:
-            return "unknown_count"
         if self._equal(given, right, NEAR_MISS):
             return "nearly"
         if self._equal(given, -right):
@@ -271,3 +264,53 @@ class ShapeJudge:
     @staticmethod
     def _name(shape: tuple[int, ...]) -> str:
         return f"shape_{'x'.join(map(str, shape))}"
+
+
+@dataclass(frozen=True, eq=False)
+class BugHunt:
+    """Judge of a planted fault, which the answer names by its line and kind: ["1", "sign"].
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Lines that may be named as the place of the fault.
+    kind : str
+        Kind of the fault.
+    praise : str
+        Comment on a right answer.
+    refuted : mapping
+        Evidence against each other kind of fault.
+    elsewhere : str
+        Evidence against all other lines.
+    """
+
+    lines: Sequence[str]
+    kind: str
+    praise: str
+    refuted: Mapping[str, str]
+    elsewhere: str
+
+    def __call__(self, answer: Any) -> Verdict:
+        """Judge an answer."""
+        parts = list(answer) if isinstance(answer, list | tuple) else []
+        if answer is None or answer is Ellipsis or parts == ["", ""]:
+            return NO_ANSWER
+        if len(parts) != 2 or not all(isinstance(part, str | int) for part in parts):
+            text = 'The answer must be the line and the kind of the fault, such as ["1", "sign"].'
+            return Verdict(False, text, "form")
+        line, kind = (str(part).lower().replace("line", "").strip() for part in parts)
+        kinds = sorted([self.kind, *self.refuted])
+        return first_fault([
+            ("no_kind", kind not in kinds, f"The kind must be one of: {', '.join(kinds)}."),
+            *((name, kind == name, text) for name, text in self.refuted.items()),
+            ("line", line not in self.lines, f"The kind is right. {self.elsewhere}"),
+        ]) or Verdict(True, self.praise)  # fmt: skip
+
+    def examples(self) -> Iterator[Example]:
+        """Yield all right answers and one answer for each hint."""
+        yield from (([line, self.kind], "") for line in self.lines)
+        yield from (([self.lines[0], kind], kind) for kind in self.refuted)
+        yield from [
+            ((f"Line {self.lines[0]}", self.kind.upper()), ""), (["0", self.kind], "line"),
+            ([self.lines[0], "?"], "no_kind"), (["1"], "form"), (["", ""], "no_answer"),
+        ]  # fmt: skip

@@ -217,6 +217,15 @@ def test_the_force_task_follows_the_gains():
         MPC(robot, contacts, gait, gains=3.0)
 
 
+@pytest.mark.parametrize(
+    ("n", "bounce", "outcome"),
+    [(1, True, "completed"), (1, False, "fell"), (3, False, "completed")],
+)
+def test_a_pronk_needs_a_horizon_or_a_reference_that_bounces(n, bounce, outcome):
+    gait = Gait.pronk(judges.load("go2"), 0.2, 0.2, start=0.2)
+    assert walked("go2", gait, 0.3, 1.4, n=n, bounce=bounce)[0].outcome == outcome
+
+
 def test_copies_and_restarts_give_the_same_torques():
     robot = judges.load("go2")
     walk = MPC(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.0), (0.3, 0.0))
@@ -237,3 +246,5 @@ def test_walk_refuses_flight_and_mpc_refuses_soles():
         MPC(talos, fb.Contacts.feet(talos), Gait.walk(talos))
     with raises(InputError, "solve_period", "0.05"):
         MPC(robot, contacts, Gait.trot(robot), solve_period=0.05)
+    with raises(InputError, "bounce", "no"):
+        MPC(robot, contacts, Gait.pronk(robot), bounce="no")

@@ -13,6 +13,7 @@ from floatbase.lessons.lesson05 import (
     moving_and_goal_state,
     stretched_arm_state,
 )
+from floatbase.lessons.lesson08 import state_with_moved_body
 from floatbase.objectives import com_wrench_map
 
 GO2 = fb.load("go2")
@@ -43,3 +44,18 @@ def test_the_centre_of_mass_is_that_of_the_state_in_the_frame_of_the_base():
     state = stretched_arm_state(1.0)
     expected = state.frame_pose("base").inverse().act(state.com)
     np.testing.assert_allclose(com_in_base(state), expected, atol=ROUNDING)
+
+
+@pytest.mark.front_end
+def test_go2_is_weakest_forwards_and_aside_also_with_equal_loads():
+    goal = state_with_moved_body(GO2.standing(), [-0.019, 0.0, 0.0])  # m
+    ways = {"forwards, aside": (1.0, 1.0), "aside": (0.0, 1.0), "backwards, aside": (-1.0, 1.0)}
+    outcomes = {}
+    for name, way in ways.items():
+        sim = fb.Simulation(GO2)
+        sim.reset(goal)
+        push = fb.Push(52.0 * np.array([*way, 0.0]) / np.linalg.norm(way), 0.05, 0.1)
+        costs = AnalyticController(GO2, EOM.contacts, goal)
+        outcomes[name] = fb.rollout(sim, costs, 0.6, [push], control_period=0.004).outcome
+    assert outcomes.pop("forwards, aside") == "fell"
+    assert set(outcomes.values()) == {"completed"}

@@ -148,21 +148,15 @@ EXERCISES = (
         "S_solo8[6, 1] = 1.0  # the knee motor also acts on the hip",
         judge=ShapeJudge(
             shapes={
-                (
-                    8,
-                    8,
-                ): "S maps 8 torques to all rows of the equations of motion. How many rows does "
-                "a base add, and where?",
+                (8, 8): "S maps 8 torques to all rows of the equations of motion. How many rows "
+                "does a base add, and where?",
                 (8, 14): "This is the transpose of the answer. S maps 8 torques to 14 rows.",
                 (9, 8): "A base adds more than one row: three for its position and three for its "
                 "orientation.",
                 (18, 12): "That is the S of go2, which has three joints in each leg. solo8 has "
                 "two.",
-                (
-                    15,
-                    8,
-                ): "15 counts the four numbers of the quaternion. The rows of (4) correspond to "
-                "velocities, and a rotation has three.",
+                (15, 8): "15 counts the four numbers of the quaternion. The rows of (4) "
+                "correspond to velocities, and a rotation has three.",
             },
             judge=NumericJudge(
                 right=_actuation_of_solo8,

@@ -7,12 +7,13 @@ from floatbase.lessons.lesson02.helpers import (
     parking_states,
     rolling_wheel,
     run_constant_torques,
+    shoved_go2,
     tool_displacement,
 )
 from floatbase.lessons.lesson02.pictures import (
     draw_equation,
     force_panel,
     parking_panel,
-    play_collapse_comparison,
     play_tool_comparison,
+    stabilization_panel,
 )

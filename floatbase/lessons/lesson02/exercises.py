@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 import floatbase as fb
 from floatbase._validation import Array
+from floatbase.dynamics import PointContact
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     NO_ANSWER,
@@ -17,27 +17,96 @@ from floatbase.lessons.judges import (
     NumericJudge,
     ShapeJudge,
     Verdict,
+    array_or_verdict,
     first_fault,
     format_vector,
 )
+from floatbase.lessons.lesson02.helpers import RECORD_ROW, shoved_go2
 from floatbase.lessons.lesson03 import standing_go2_eom
 
 
-@cache
-def _moving_go2() -> tuple[fb.State, fb.Contacts]:
-    """Return the moving go2 of the exercises, and its contacts."""
-    robot = fb.load("go2")
-    slow = robot.random_state(5)
-    return slow.replace(v=8 * slow.v), fb.Contacts.points(robot)
+def _recorded_rows() -> Array:
+    """Return six zeros and the recorded torques."""
+    return np.concatenate([np.zeros(6), shoved_go2().tau[RECORD_ROW]])
 
 
-def _generalised() -> Array:
-    """Return Jᵀ λ by virtual work, with finite differences of the foot's position."""
-    state, _ = _moving_go2()
-    force, h = np.array([10.0, -5.0, 40.0]), 1e-6
-    ahead = [state.replace(q=state.integrate(h * e)).point("FL_foot") for e in np.eye(18)]
-    back = [state.replace(q=state.integrate(-h * e)).point("FL_foot") for e in np.eye(18)]
-    return np.array([force @ (a - b) / (2 * h) for a, b in zip(ahead, back, strict=True)])
+def _row_mistakes() -> list[Mistake]:
+    record, i = shoved_go2(), RECORD_ROW
+    state, forces = record.state(i), record.measured[i]
+    inertial = state.M @ (record.v[i + 1] - record.v[i]) / 1e-3
+    bias, contact = state.h, fb.Contacts.points(state.robot).jacobian(state).T @ forces
+    balls = fb.Contacts([PointContact(foot.frame) for foot in state.robot.feet])
+    return [
+        ("no_forces", inertial + bias, "This is inverse dynamics of a robot that touches nothing. "
+         "Its base rows are what the ground supplies. Which term of (4) is missing?"),
+        ("sign_of_forces", inertial + bias + contact, "The base rows show twice what the ground "
+         "supplies. On which side of (4) is Jᵀ λ?"),
+        ("at_rest", bias - contact, "Without M q̈, this is a robot that does not accelerate."),
+        *(("other_rows", state.M @ (record.v[j] - record.v[i - 1]) / dt + bias - contact,
+         "The forces of row 300 act from row 300 to row 301. Which two velocities belong to them?")
+          for j, dt in ((i, 1e-3), (i + 1, 2e-3))),
+        ("no_h", inertial - contact, "The third row is minus the weight. Which term of (4) "
+         "contains gravity?"),
+        ("at_ball", inertial + bias - balls.jacobian(state).T @ forces, "The moments are not zero: "
+         "these forces act at the middle of each foot. They act where it touches the ground."),
+    ]  # fmt: skip
+
+
+def _error_of_line() -> Array:
+    """Return by how much line 1 of exercise 02.2 is too large [m/s²]: axes that turn."""
+    v = shoved_go2().v[RECORD_ROW]
+    return np.asarray(np.cross(v[3:6], v[:3]))
+
+
+def _error_mistakes() -> list[Mistake]:
+    state, right = shoved_go2().state(RECORD_ROW), _error_of_line()
+    return [
+        ("no_error", 0.0 * right, "The line is right. By how much is its result wrong?"),
+        ("force", state.robot.mass * right, "These are the base rows, in N. Which acceleration "
+         "causes them?"),
+        ("sign", -right, "The line is right, but the sign is wrong. The base rows are the mass "
+         "times what line 1 adds."),
+        ("world_axes", state.frame_pose("base").rotation @ right, "The line is right, but these "
+         "numbers are in the axes of the world. The base rows are in the axes of the base."),
+    ]  # fmt: skip
+
+
+ERROR_JUDGE = NumericJudge(
+    right=_error_of_line,
+    tolerance=0.01,  # a number read from the printed rows has two digits
+    praise="Line 1 is the acceleration of the base in the world. q̈ holds the rate of v in axes "
+    "that turn, and the difference is ω × v_lin, as for the wheel.",
+    mistakes=_error_mistakes,
+)
+
+
+def _judge_fault(answer: Any) -> Verdict:
+    """Judge the line that is wrong, and by how much [m/s²]: four numbers, or one and a vector."""
+    if isinstance(answer, (tuple, list)) and len(answer) == 2:
+        answer = [answer[0], *np.ravel(answer[1])]
+    given = array_or_verdict(answer, (4,))
+    if isinstance(given, Verdict):
+        return given
+    line = given[0]
+    return first_fault([
+        ("no_line", line not in (1, 2, 3, 4), "The first number is the number of the wrong line, "
+         "from 1 to 4."),
+        ("line_2", line == 2, "Line 2 is the angular acceleration of the base and those of the "
+         "joints. Would a fault there leave the moment rows almost zero?"),
+        ("line_3", line == 3, "A wrong state would give a wrong J, so the contact forces would "
+         "have wrong moments. The moment rows are almost zero."),
+        ("line_4", line == 4, "A wrong sign or place of the forces would show in the vertical row "
+         "or in the moments, also at 0 ms. There, all rows are zero."),
+    ]) or ERROR_JUDGE(given[1:])  # fmt: skip
+
+
+def _faults() -> list[Example]:
+    """Return examples: the right line with each error, and the wrong lines."""
+    lines = ((0, "no_line"), (2, "line_2"), (3, "line_3"), (4, "line_4"))
+    return [
+        *((np.array([1, *error]), hint) for error, hint in ERROR_JUDGE.examples()),
+        *(((line, _error_of_line()), hint) for line, hint in lines),
+    ]
 
 
 def _judge_holding(answer: Any) -> Verdict:
@@ -121,92 +190,40 @@ def _holdings() -> list[Example]:
     ]  # fmt: skip
 
 
-def _shape_mistakes() -> list[Mistake]:
-    return [
-        ("joints_alone", (9, 8), "These are only the columns of the joints. The base also moves a "
-         "foot, so it has columns, too."),
-        ("base_is_one", (9, 9), "A base has six directions, not one: φ maps from R^(d+6)."),
-        ("quaternion", (9, 15), "q has 15 numbers, four of them for the quaternion. J has a column "
-         "for each component of the velocity."),
-        ("transpose", (14, 9), "This is the shape of the transpose."),
-        ("joints_of_one_foot", (3, 8), "Three rows are for one foot. The base has columns, too."),
-        ("one_foot", (3, 14), "Three rows are for one foot. Three feet touch the ground."),
-        ("four_feet", (12, 14), "Three feet touch the ground, not four."),
-        ("lifted_leg", (9, 12), "The joints of the lifted leg count, too. Their columns are zero."),
-        ("joints_for_components", (6, 14), "The velocity of a foot has three components, whatever "
-         "the number of joints in its leg."),
-        ("go2", (9, 18), "18 columns are for go2, which has three joints in each leg. solo8 has "
-         "two."),
-    ]  # fmt: skip
-
-
-def _force_mistakes() -> list[Mistake]:
-    force, state = np.array([10.0, -5.0, 40.0]), _moving_go2()[0]
-    right, R, J = _generalised(), state.frame_pose("base").rotation, state.frame_jacobian("FL_foot")
-    in_world = np.concatenate([R @ right[:3], R @ right[3:6], right[6:]])
-    joints_only = np.concatenate([np.zeros(6), right[6:]])
-    return [
-        ("sign", -right, "The sign is wrong. λ is the force of the ground on the robot, "
-         "and it is on the same side as S τ."),
-        ("world_axes", in_world, "The base rows are in world axes. v, and so "
-         "the base rows, are in the axes of the base."),
-        ("base_zero", joints_only, "The base rows are zero. Motors do not act on "
-         "the base, but a contact force does."),
-        ("standing", fb.load("go2").standing().frame_jacobian("FL_foot")[:3].T @ force,
-         "This is the Jacobian of the standing robot. `moving` has another posture, so J differs."),
-        ("eom_standing", standing_go2_eom().J[:3].T @ force, "This is the J of `eom`, "
-         "which is for the standing robot and for the points that touch the ground."),
-        ("contact_point", fb.equations_of_motion(*_moving_go2()).J[:3].T @ force,
-         "This force acts at the point that touches the ground. `ground_force` acts at the origin "
-         "of the frame, 2 cm away."),
-        ("turned", J[:3].T @ R.T @ force, "`ground_force` is in world axes, and so are the rows of "
-         "frame_jacobian. No rotation is needed."),
-        ("angular_rows", J[3:].T @ force, "These are the angular rows of the Jacobian. For a force "
-         "at a point, use the linear rows, which come first."),
-        ("zero", np.zeros(18), "Zero would mean that the force has no effect."),
-    ]  # fmt: skip
-
-
 EXERCISES = (
     Exercise(
         name="02.1",
-        stub="shape_of_J = (3, 8)  # replace this",
-        solution="shape_of_J = (9, 14)",
-        judge=NumericJudge(
-            is_count=True,
-            right=lambda: (
-                fb.equations_of_motion(
-                    fb.load("solo8").standing(),
-                    fb.Contacts.points(fb.load("solo8"), frames=["FL_FOOT", "FR_FOOT", "HL_FOOT"]),
-                ).J.shape
+        stub="rows = np.zeros(18)  # replace this: record.state, record.measured",
+        solution="""i = 300  # ms
+now, later = record.state(i), record.state(i + 1)
+terms = fb.equations_of_motion(now, contacts)
+qdd = (later.v - now.v) / 0.001
+rows = terms.M @ qdd + terms.h - terms.J.T @ record.measured[i]""",
+        judge=ShapeJudge(
+            shapes={
+                (12,): "These may be the torques, but how do you know? The six base rows are your "
+                "check. The answer needs all 18 rows.",
+            },
+            judge=NumericJudge(
+                right=_recorded_rows,
+                tolerance=5e-3,  # differences over a millisecond
+                praise="Six zeros, and then the torques that the motors applied. The zeros check "
+                "the model, the forces and the differences at once.",
+                mistakes=_row_mistakes,
             ),
-            praise="Three rows for each point, and one column for each direction in which the "
-            "robot can move: d + 6.",
-            mistakes=_shape_mistakes,
         ),
-        explanation="k = 3 · 3 for three feet, and there are d + 6 = 8 + 6 columns.",
+        explanation="(4) solved for S τ. The differences over one millisecond leave 0.01 N in "
+        "the base rows. At 100 ms, these rows hold the push of 150 N, which is not in λ.",
     ),
     Exercise(
         name="02.2",
-        stub="generalised = np.zeros(18)  # replace this: moving.frame_jacobian, ground_force",
-        solution='generalised = moving.frame_jacobian("FL_foot")[:3].T @ ground_force',
-        judge=ShapeJudge(
-            shapes={
-                (3,): "(4) has a row for each component of the velocity. J maps 18 numbers to "
-                "3, and its transpose goes back.",
-                (12,): "These are only the joints. The force also pushes on the base: its six rows "
-                "are missing.",
-                (6,): "frame_jacobian has six rows, three linear and three angular. For a force "
-                "at a point, use the first three.",
-            },
-            judge=NumericJudge(
-                right=_generalised,
-                praise="The same matrix maps the velocities to the foot's velocity, and its "
-                "transpose maps the foot's force to all rows.",
-                mistakes=_force_mistakes,
-            ),
-        ),
-        explanation="Power is the same in both descriptions: λ · (J v) = (Jᵀ λ) · v for every v.",
+        stub="fault = np.array([0, 0.0, 0.0, 0.0])  # the line, and three numbers in m/s²",
+        solution="""omega, v_lin = record.v[300, 3:6], record.v[300, :3]
+fault = np.array([1, *np.cross(omega, v_lin)])""",
+        judge=_judge_fault,
+        examples=_faults,
+        explanation="The base rows are wrong only while the base turns and moves, at right angles "
+        "to both. They equal the mass times ω × v_lin, which line 1 contains and v̇ does not.",
     ),
     Exercise(
         name="02.3",

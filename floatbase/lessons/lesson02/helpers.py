@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from floatbase.simulation import Rollout
 # (eom, τ, b) -> (q̈, λ), by (7)
 MotionSolver = Callable[[EquationsOfMotion, Array, Array], tuple[Array, Array]]
 DISC_RADIUS = 0.2  # m, of assets/models/disc.urdf
+RECORD_ROW = 300  # in the record of the exercises: after the push, while the base still turns
 
 
 def run_constant_torques(
@@ -38,6 +40,22 @@ def run_constant_torques(
     return fb.rollout(
         fb.Simulation(robot), ConstantTorques(torques, contacts, by_equation), duration
     )
+
+
+@cache
+def shoved_go2() -> Rollout:
+    """Return a record of go2 that stands while something pushes its front left hip to the left.
+
+    Returns
+    -------
+    Rollout
+        The record of 0.35 s, with a row for each millisecond. The push lasts from 0.05 s to 0.15 s.
+    """
+    robot = fb.load("go2")
+    tasks = fb.standing_tasks(robot.standing())
+    controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
+    push = fb.Push(np.array([0.0, 150.0, 0.0]), start=0.05, duration=0.1, frame="FL_hip")
+    return fb.rollout(fb.Simulation(robot), controller, 0.35, [push])
 
 
 def foot_displacement(states: Sequence[fb.State], contacts: fb.Contacts) -> Array:

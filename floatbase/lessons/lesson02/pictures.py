@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from itertools import pairwise
 
 import matplotlib.pyplot as plt
@@ -10,8 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import floatbase as fb
+from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.lessons import props
+from floatbase.lessons import props, svg
 from floatbase.lessons.judges import format_vector
 from floatbase.lessons.lesson02.helpers import DISC_RADIUS, parking_states, rolling_wheel
 from floatbase.lessons.panels import SliderPanel, slider_panel
@@ -58,8 +59,8 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
 
     def draw(forwards: float, up: float) -> str:
         force = np.array([forwards, 0.0, up])
-        generalised = J.T @ force
-        f, moment = base.rotation @ generalised[:3], base.rotation @ generalised[3:6]
+        generalized = J.T @ force
+        f, moment = base.rotation @ generalized[:3], base.rotation @ generalized[3:6]
         forces = np.zeros((len(contacts), 3))
         forces[where] = force
         size, scale = view.painter.size, view.scale
@@ -77,11 +78,11 @@ def force_panel(view: Viewer, state: fb.State, contacts: fb.Contacts, foot: str)
             state, contacts, planned=forces, com=False, cones=False, extra=extra
         )
         view.draw({path.replace("planned/", "force/"): item for path, item in picture.items()})
-        torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalised[6:][leg], 1))
-        rest = np.delete(generalised[6:], leg)
+        torques = ", ".join(f"{x + 0.0:.1f}" for x in np.round(generalized[6:][leg], 1))
+        rest = np.delete(generalized[6:], leg)
         return (
-            f"base rows: force {format_vector(generalised[:3])} N, moment "
-            f"{format_vector(generalised[3:6], 1)} N·m; "
+            f"base rows: force {format_vector(generalized[:3])} N, moment "
+            f"{format_vector(generalized[3:6], 1)} N·m; "
             f"joints of this leg {torques} N·m; all other joints {np.abs(rest).max():.0f}"
         )
 
@@ -110,33 +111,26 @@ def play_tool_comparison(view: Viewer, without_b: Rollout, with_b: Rollout) -> V
     return view.camera(View(66.0, 14.0, 1.0, around=((0.24, 0.1, 0.62), 0.32)))
 
 
-def play_collapse_comparison(
-    view: Viewer,
-    without_b: Sequence[fb.State],
-    with_b: Sequence[fb.State],
-    contacts: fb.Contacts,
-    duration: float,
-) -> Viewer:
-    """Play the robot without b, and the robot with b as a ghost."""
-    places, colour = contacts.positions(without_b[0]), view.painter.text_colour
-    home = {
-        f"home/{i}": shapes.contact_patch([*p[:2], 0.001], [0.0, 0.0, 1.0], 0.03)
-        for i, p in enumerate(places)
-    }
+def stabilization_panel(distances: Callable[[float], Array], timestep: float) -> SliderPanel:
+    """Return a panel with a slider for α: distances(α) of the worst foot from its pin [mm]."""
+    without = distances(0.0)
+    wide, high, top = 420, 180, 1.1 * without.max()  # px, px, mm
 
-    def picture(ours: fb.State, theirs: fb.State) -> Picture:
-        drawn = view.painter.picture(ours, com=False, ghost=theirs) | home
-        for i, (a, b) in enumerate(zip(places, contacts.positions(ours), strict=True)):
-            if np.linalg.norm(b - a) > 2e-3:
-                aside = np.array([0.0, 0.06 * np.sign(a[1]), 0.0])  # beside the legs, to be visible
-                drawn[f"way/{i}"] = props.rod_between(a + aside, b + aside, 0.006, colour)
-        return drawn
+    def curve(distance: Array, **style: str | float) -> str:
+        across = np.linspace(0, wide, len(distance))
+        up = high * (1 - np.clip(distance / top, -0.1, 1.1))
+        return svg.polyline(np.column_stack([across, up]), **style)
 
-    rows = np.linspace(0, len(with_b) - 1, 30).astype(int)
-    view.add_legend_entry("way", colour, "from where a foot belongs to where it is")
-    pictures = [picture(without_b[i], with_b[i]) for i in rows]
-    view.play_pictures(np.linspace(0.0, duration, 30), pictures, speed=0.1, ghost_name="with b")
-    return view.camera(View(72.0, 10.0, 1.0, around=((0.0, 0.0, 0.16), 0.36)))
+    def draw(α: float) -> str:
+        distance = distances(α)
+        drawn = svg.line((0, high), (wide, high)) + svg.line((0, 0), (0, high))
+        drawn += curve(without, stroke=hex_code(GREYS[2]), stroke_dasharray="6 4")
+        drawn += curve(distance, stroke="currentColor", stroke_width=2)
+        words = f"distance of the worst foot, up to {top:.0f} mm, in 0.2 s; dashed: α = 0"
+        note = f"α dt = {α * timestep:.2f}: {distance[-1]:.2g} mm at the end"
+        return svg.captioned(drawn, (wide, high), 10, words, note)
+
+    return slider_panel(None, draw, α=(0.0, 50.0, 210.0, "1/s"))
 
 
 def parking_panel(view: Viewer, robot: Robot) -> SliderPanel:

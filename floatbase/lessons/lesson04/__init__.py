@@ -1,6 +1,5 @@
 """Lesson 04, One cost, many spaces."""
 
-from floatbase.lessons.lesson03 import tilted_go2_eom
 from floatbase.lessons.lesson04.helpers import (
     DESIRED_ACCELERATION,
     MinimumCostController,

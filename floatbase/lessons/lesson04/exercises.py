@@ -12,10 +12,8 @@ from floatbase._validation import Array
 from floatbase.dynamics import EquationsOfMotion
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
+    BugHunt,
     Example,
-    Mistake,
-    NumericJudge,
-    ShapeJudge,
     Verdict,
     array_or_verdict,
     first_fault,
@@ -23,56 +21,10 @@ from floatbase.lessons.judges import (
     minimiser_or_verdict,
     stopped,
 )
-from floatbase.lessons.lesson03 import standing_go2_eom, tilted_go2_eom
+from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson04.helpers import DESIRED_ACCELERATION, MinimumCostController
 from floatbase.objectives import tangential_bias
 from floatbase.simulation import Rollout
-
-# 04.1 ---------------------------------------------------------------------------------------------
-
-
-def _gradient_by_newton() -> Array:
-    """Compute the gradient from the contact forces: a_c = Σ f / m + g with λ = ζ(τ)."""
-    eom = tilted_go2_eom()
-    zeta, mass = fb.forces_from_torques(eom), eom.robot.mass
-    sums = np.tile(np.eye(3), 4) / mass
-    return (sums @ zeta.A).T @ (
-        sums @ zeta.b + eom.robot.model.gravity.linear - DESIRED_ACCELERATION
-    )
-
-
-def _gradients() -> list[Mistake]:
-    eom = tilted_go2_eom()
-    state, eta = eom.state, fb.accelerations_from_torques(eom)
-    J, drift, offset = state.com_jacobian, state.com_drift, state.com_jacobian @ eta.b
-    back, R, desired = eta.A.T @ J.T, state.frame_pose("base").rotation, DESIRED_ACCELERATION
-    right = back @ (offset + drift - desired)
-    still = standing_go2_eom().state
-    cost_of_standing = fb.Quadratic.from_residual(still.com_jacobian, desired - still.com_drift)
-    return [
-        ("zero", np.zeros(12), "There is no answer yet. The gradient is zero at a minimum, but τ = "
-         "0 is not a minimum."),
-        ("sign", -right, "The sign is wrong. The residual is actual - desired, and the gradient "
-         "points uphill."),
-        ("drift_forgotten", back @ (offset - desired), "The drift is missing. The centre of mass "
-         "accelerates by J_c q̈ + J̇_c q̇."),
-        ("drift_sign", back @ (offset - drift - desired), "The drift has the wrong sign."),
-        ("offset_forgotten", back @ (drift - desired), "η has an offset: even with the motors off, "
-         "the robot accelerates by `eta_moving.b`."),
-        ("offset_and_drift_forgotten", back @ -desired, "The offset of η and the drift are both "
-         "missing."),
-        ("into_world", back @ (offset + drift - R @ desired), "The frame is wrong. `desired` is in "
-         "world axes, like the Jacobian and the drift. Do not rotate it."),
-        ("out_of_world", back @ (offset + drift - R.T @ desired), "The frame is wrong. `desired` "
-         "is in world axes already, and the rotation of the base takes it out of these axes."),
-        ("pseudo_inverse", np.linalg.pinv(eta.A) @ J.T @ (offset + drift - desired),
-         "A gradient comes back through the transpose of η's matrix. A pseudo-inverse is for "
-         "points."),
-        ("standing", cost_of_standing.pullback(eta).g, "This is the cost of the standing robot. "
-         "The moving robot has another Jacobian and drift."),
-        ("half", 2 * right, "The cost has a factor ½, which cancels the 2 from the square."),
-    ]  # fmt: skip
-
 
 # 04.2 ---------------------------------------------------------------------------------------------
 
@@ -220,24 +172,26 @@ def _designs() -> list[Example]:
 EXERCISES = (
     Exercise(
         name="04.1",
-        stub="gradient = np.zeros(12)  # replace: from eta_moving, J_moving, drift_moving, desired",
-        solution="residual = J_moving @ eta_moving.b + drift_moving - desired\n"
-        "gradient = eta_moving.A.T @ J_moving.T @ residual",
-        judge=ShapeJudge(
-            NumericJudge(
-                right=_gradient_by_newton,
-                praise="This is the chain rule: points go forward through η, and gradients come "
-                "back through its transpose.",
-                mistakes=_gradients,
-            ),
-            {
-                (18,): "18 numbers are the gradient with respect to q̈. One step back to the "
-                "torques is missing.",
-                (3,): "3 numbers are the residual. Two steps back to the torques are missing.",
-                (12, 12): "That is a curvature, shape (12, 12). The gradient is a vector.",
+        stub='fault = ["", ""]  # the line, and: frame, sign, transpose, missing term',
+        solution='fault = ["2", "frame"]',
+        judge=BugHunt(
+            lines=("2", "3"),
+            kind="frame",
+            praise="The residual subtracts world axes from base axes. They agree only as long as "
+            "the robot faces forwards.",
+            refuted={
+                "sign": "With a wrong sign, go2 would accelerate the other way at every heading. "
+                "At 0° the result is right.",
+                "transpose": "Rᵀ does take a vector from world axes to base axes. Does everything "
+                "in the residual go there?",
+                "missing term": "A missing term would change the magnitude. It is 0.5 m/s² at "
+                "every heading.",
             },
+            elsewhere="At 0° the result is right, at 90° it is turned by 90°. Which line depends "
+            "on the heading?",
         ),
-        explanation="This is (15) by hand. `pullback(eta).g` of the same cost gives it, too.",
+        explanation="Line 2 turns the Jacobian into base axes, and line 3 leaves the goal and the "
+        "drift in world axes. Turn both or neither.",
     ),
     Exercise(
         name="04.2",

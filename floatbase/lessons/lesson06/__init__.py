@@ -1,6 +1,5 @@
 """Lesson 06, Friction cones."""
 
-from floatbase.lessons.lesson06.exercises import stance_on_hill
 from floatbase.lessons.lesson06.helpers import (
     ConeController,
     accelerate,

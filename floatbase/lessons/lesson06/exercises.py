@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-import floatbase as fb
 from floatbase._validation import Array
-from floatbase.friction import FrictionCone, FrictionPolyhedron, decompose, tangents
+from floatbase.friction import FrictionCone, FrictionPolyhedron, tangents
 from floatbase.lessons.exercises import Exercise, OwnNumber
 from floatbase.lessons.judges import (
-    Example,
+    BugHunt,
     Mistake,
     NumericJudge,
     ShapeJudge,
-    Verdict,
-    array_judge,
-    first_fault,
 )
 from floatbase.lessons.lesson06.pictures import slope_normal
-from floatbase.objectives import com_wrench_map
 
 # of exercise 06.1: normal, not a unit vector; μ; number of facets
 BANK, BANK_MU, BANK_FACETS = np.array([0.3, -0.2, 1.0]), 0.5, 5
 FACETS, MU = 8, 0.7  # of exercise 06.2
-HILL, MARGIN = 20.0, 9.0  # of exercise 06.3: degrees; N
-BALANCE = 0.1  # N, and N·m: tolerance of the balance in exercise 06.3
-SOLVED = 1e-3  # N: tolerance of the margin in exercise 06.3, for any solver
 
 
 class _HalfSpaceJudge(NumericJudge):
@@ -62,10 +53,12 @@ def _rows_from_edges(mu: float = BANK_MU, normal: npt.ArrayLike = BANK, turn: fl
     return np.asarray(rows / np.linalg.norm(rows - np.outer(rows @ n, n), axis=1)[:, None])
 
 
-def _with_tangents(mu_facet: float, subtracted: npt.ArrayLike | None = None) -> Array:
+def _with_tangents(
+    mu_facet: float, subtracted: npt.ArrayLike | None = None, level: bool = False
+) -> Array:
     """Return d_i - mu_facet · (subtracted, or the unit normal) for exercise 06.1."""
     n = BANK / np.linalg.norm(BANK)
-    t1, t2 = tangents(n)
+    t1, t2 = np.eye(3)[:2] if level else tangents(n)
     angles = 2 * np.pi * np.arange(BANK_FACETS) / BANK_FACETS
     directions = np.outer(np.cos(angles), t1) + np.outer(np.sin(angles), t2)
     return np.asarray(directions - mu_facet * (n if subtracted is None else np.asarray(subtracted)))
@@ -85,6 +78,10 @@ def _facet_mistakes() -> list[Mistake]:
         ("no_mu", _rows_from_edges(1.0), "μ is missing: these are the facets for μ = 1."),
         ("turned", _rows_from_edges(turn=np.pi / 5), "The facets are rotated by half a facet. "
          "Facet 0 must face t1."),
+        ("horizontal", _with_tangents(BANK_MU * np.cos(np.pi / 5), level=True), "The directions d "
+         "are horizontal. On a bank they must lie along the surface, as `tangents` gives them."),
+        ("whole_angle", _with_tangents(BANK_MU * np.cos(2 * np.pi / 5)), "This uses cos(2π/N). "
+         "From the middle of a facet to its edge it is half of that angle, π/N."),
         ("level", _rows_from_edges(normal=[0.0, 0.0, 1.0]), "These are the constraints on level "
          "ground. Use the given normal."),
     ]  # fmt: skip
@@ -99,111 +96,6 @@ def _slip_angle(facets: int | None = FACETS, inside: bool = True, mu: float = MU
         cone = FrictionCone(n, mu) if facets is None else FrictionPolyhedron(n, mu, facets, inside)
         low, high = (middle, high) if cone.contains([0.0, 0.0, 1.0]) else (low, middle)
     return low
-
-
-@cache
-def stance_on_hill() -> tuple[fb.State, fb.Contacts]:
-    """Return go2 standing on the slope of exercise 06.3, and its contacts."""
-    robot, n = fb.load("go2"), slope_normal(HILL)
-    return fb.Simulation(robot, fb.Ground(normal=n)).state, fb.Contacts.points(robot, MU, normals=n)
-
-
-@array_judge((12,))
-def _judge_forces(given: Array) -> Verdict:
-    """Judge forces for exercise 06.3 by their sum, moment and margins."""
-    f = given.reshape(4, 3)
-    return _out_of_balance(f) or _judge_margins(f)
-
-
-def _out_of_balance(f: Array) -> Verdict | None:
-    """Return what is wrong with the sum or moment of forces, shape (4, 3) [N], or None."""
-    state, contacts = stance_on_hill()
-    weight, n = state.robot.weight, slope_normal(HILL)
-    carried = weight * np.array([0.0, 0.0, 1.0])
-    total = f.sum(axis=0)
-    missing = np.linalg.norm(total - carried)
-    moment = np.linalg.norm(np.cross(contacts.positions(state) - state.com, f).sum(axis=0))
-
-    def is_near(force: Array) -> bool:
-        return bool(np.linalg.norm(total - force) < BALANCE)
-
-    return first_fault([
-        ("no_force", is_near(0.0 * n), "The forces do not carry the robot yet."),
-        ("sign", is_near(-carried), "The sign is wrong. λ is the force of the ground on the robot, "
-         "and it pushes upwards."),
-        ("slides", is_near(weight * n[2] * n), "These forces carry only the normal component of "
-         "the weight, so the robot slides."),
-        ("along_normal", is_near(weight * n), "Their sum has the magnitude of the weight, but it "
-         "is along the normal of the slope. Gravity is vertical."),
-        ("sum", missing > BALANCE, f"The sum differs by {missing:.1f} N from the force that "
-         "carries the weight."),
-        ("moment", moment > BALANCE, f"The sum is right, but a moment of {moment:.1f} N·m remains: "
-         "go2 would turn over."),
-    ])  # fmt: skip
-
-
-def _judge_margins(f: Array) -> Verdict:
-    """Judge whether each of the balanced forces, shape (4, 3) [N], is well inside its cone."""
-    names, n = stance_on_hill()[1].names, slope_normal(HILL)
-    margins = np.array([FrictionCone(n, MU).margin(each) for each in f])
-    upright = np.array([FrictionCone(np.array([0.0, 0.0, 1.0]), MU).margin(each) for each in f])
-    least = f"{names[int(np.argmin(margins))]} has a margin of {margins.min():.1f} N"
-    if margins.min() >= MARGIN - SOLVED:
-        text = f"The forces are balanced. The smallest margin is {margins.min():.1f} N."
-        return Verdict(True, text)
-    return first_fault([
-        ("upright", np.abs(f[:, :2]).max() < BALANCE and margins.min() >= -BALANCE,
-         f"Vertical forces are balanced and inside their cones, but {least} only. Internal forces "
-         "can give some of the front feet's tangential force to the rear feet."),
-        ("alike", np.ptp([decompose(each, n).f_par for each in f], axis=0).max() < BALANCE,
-         "The forces are balanced. But all feet have the same tangential force, and the upper feet "
-         f"carry little: {least}."),
-        ("in_cones", margins.min() >= -BALANCE, "The forces are balanced and inside their cones, "
-         f"but {least} only."),
-        ("vertical_cones", upright.min() >= MARGIN, "The forces are balanced and have enough "
-         "margin in cones about the vertical. But in the cones about the slope's normal, "
-         f"{least}."),
-    ]) or Verdict(
-        False, f"The forces are balanced, but one is outside its cone: {least}.", "outside"
-    )  # fmt: skip
-
-
-def _in_balance(facets: int, room: float) -> Array:
-    """Return the smallest forces that carry go2 on the hill with a margin, shape (12,) [N]."""
-    state, contacts = stance_on_hill()
-    carry = np.array([0.0, 0.0, state.robot.weight, 0.0, 0.0, 0.0])
-    rows = np.kron(np.eye(4), FrictionPolyhedron(slope_normal(HILL), MU, facets).face_matrix)
-    balance = (com_wrench_map(state, contacts).A, carry)
-    return fb.solve(fb.QP(np.eye(12), np.zeros(12), *balance, rows, np.full(len(rows), -room))).x
-
-
-def _vertical() -> Array:
-    """Return vertical forces that carry go2 on the hill, equal at both feet of a pair."""
-    state, contacts = stance_on_hill()
-    x = contacts.positions(state)[:, 0] - state.com[0]
-    front = state.robot.weight / 2 * x[2] / (x[2] - x[0])
-    forces = np.zeros((4, 3))
-    forces[:, 2] = front, front, state.robot.weight / 2 - front, state.robot.weight / 2 - front
-    return forces.ravel()
-
-
-def _forces() -> list[Example]:
-    state, contacts = stance_on_hill()
-    weight, n = state.robot.weight, slope_normal(HILL)
-    smallest = np.linalg.pinv(com_wrench_map(state, contacts).A) @ [0, 0, weight, 0, 0, 0]
-    # the left feet against the right feet: the sum and the moment do not change
-    squeeze = np.zeros(12)
-    squeeze[[7, 10]] = 1.0, -1.0
-    return [
-        *((_in_balance(facets, room), "") for facets, room in ((8, 9.0), (16, 9.0), (16, 10.0))),
-        (np.zeros(12), "no_force"), (-smallest, "sign"),
-        (np.tile(weight * n[2] * n / 4, 4), "slides"),
-        (np.tile(weight * n / 4, 4), "along_normal"), (0.9 * smallest, "sum"),
-        (np.tile([0.0, 0.0, weight / 4], 4), "moment"), (smallest, "alike"),
-        (smallest + squeeze, "vertical_cones"),
-        (_in_balance(16, 0.1), "in_cones"), (_vertical(), "upright"),
-        (smallest + 40 * squeeze, "outside"),
-    ]  # fmt: skip
 
 
 def _slope_mistakes(mu: float) -> list[Mistake]:
@@ -277,20 +169,25 @@ EXERCISES = (
     ),
     Exercise(
         name="06.3",
-        stub="forces_on_hill = np.tile([0, 0, robot.weight / 4], 4)  # replace or change",
-        solution="from floatbase.friction import FrictionPolyhedron\n"
-        "from floatbase.objectives import wrench_objective\n\n"
-        "carry = wrench_objective(hill_state, hill_contacts, [0, 0, robot.weight], np.zeros(3))\n"
-        "small = fb.Quadratic.from_residual(np.eye(12), np.zeros(12), 1e-6)\n"
-        "facets = [FrictionPolyhedron(n, 0.7, 8).face_matrix for n in hill_contacts.normals]\n"
-        "rows_on_hill = block_diag(*facets)\n"
-        "# each facet with 9 N to spare\n"
-        "forces_on_hill = constrained_minimiser(carry + small, rows_on_hill, -9)",
-        judge=_judge_forces,
-        namespace=lambda: {"robot": fb.load("go2")},
-        examples=_forces,
-        explanation="The constraints of all feet have -9 on the right-hand side, and the cost is "
-        "the desired wrench with a small weight on the size of the forces. An internal force "
-        "moves tangential force from the front feet to the rear feet, which carry more.",
+        stub='fault = ["", ""]  # the line, and: frame, sign, transpose, missing term',
+        solution='fault = ["2", "sign"]',
+        judge=BugHunt(
+            lines=("2",),
+            kind="sign",
+            praise="On a slope that rises forwards, the normal leans backwards. This one leans "
+            "forwards by the same angle.",
+            refuted={
+                "frame": "With rows for level ground, the middle of each interval would move by "
+                "the slope itself. It moves by twice the slope.",
+                "transpose": "A transpose would change the rows on level ground as well. They are "
+                "right.",
+                "missing term": "On level ground all is right, and the width of the interval is "
+                "52° on every slope. So no term is missing.",
+            },
+            elsewhere="The middle of each interval is the axis of the cone. Which line chooses "
+            "this axis?",
+        ),
+        explanation="The axis of the cone is off by twice the slope, so the normal leans to the "
+        "wrong side. It must be (-sin, 0, cos).",
     ),
 )

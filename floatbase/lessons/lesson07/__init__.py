@@ -7,6 +7,5 @@ from floatbase.lessons.lesson07.helpers import (
     make_controller,
     median_time_ms,
     run_with_push,
-    tuned_controller,
 )
-from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot
+from floatbase.lessons.lesson07.pictures import multiplier_text, plot_one_foot, plot_ways_out

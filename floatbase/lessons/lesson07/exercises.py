@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 
 import floatbase as fb
@@ -11,28 +9,19 @@ from floatbase._validation import Array
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     NEAR_MISS,
+    BugHunt,
     Example,
     Mistake,
     NumericJudge,
     Verdict,
     array_judge,
     first_fault,
-    lasting_or_verdict,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom
-from floatbase.lessons.lesson07.helpers import (
-    PUSH_DURATION,
-    PUSH_START,
-    leaning_controller,
-    run_with_push,
-    tuned_controller,
-)
+from floatbase.lessons.lesson07.helpers import leaning_controller
 from floatbase.lessons.rounding import rounded
 from floatbase.qp import ConstraintLabel
-from floatbase.simulation import Rollout
 
-HARD, AFTER = 150.0, 1.0  # of exercise 07.3: N, and s after the end of the push
-AWAY, STRAYED, BACK = 53.0, 9.0, 3.0  # mm: limits of exercise 07.3
 STEP = 0.005  # increase of μ in exercise 07.2
 
 
@@ -142,64 +131,6 @@ def change_mistakes() -> list[Mistake]:
     ]  # fmt: skip
 
 
-# 07.3 ---------------------------------------------------------------------------------------------
-
-
-@cache
-def _record(design: tuple[float, ...]) -> Rollout:
-    return run_with_push(
-        tuned_controller(*design), HARD, round(PUSH_START + PUSH_DURATION + AFTER, 3)
-    )
-
-
-@array_judge((4,))
-def judge_design(given: Array) -> Verdict:
-    """Judge gains and weights in simulation."""
-    if np.any(given < 0) or given[2] == 0:
-        text = (
-            "Gains and weights must not be negative, and the centre of mass needs a weight above 0."
-        )
-        return Verdict(False, text, "negative")
-    record = lasting_or_verdict(lambda: _record(tuple(given.tolist())))
-    if isinstance(record, Verdict):
-        return record
-    away = 1e3 * np.linalg.norm((record.com - record.com[0])[:, :2], axis=1)
-    strayed = 1e3 * record.slip().max()
-    end = rounded(round(away[-1], 1), "mm", floor=0.5)
-    text = (
-        f"x_c moves by {away.max():.1f} mm at most, {end} at the end; a foot moves by "
-        f"{strayed:.1f} mm"
-    )
-    return first_fault([
-        ("stays_away", away.max() > AWAY and away[-1] > BACK, "The robot goes too far and stays "
-         f"there: {text}. How does each gain affect e?"),
-        ("creeps", away[-1] > BACK, f"The robot returns too slowly: {text}. A damper without a "
-         "spring does not know the place."),
-        ("too_far_and_strays", away.max() > AWAY and strayed > STRAYED, "The robot goes too far, "
-         f"and so does a foot: {text}. A spring pulls hardest at the far end, a damper earlier."),
-        ("too_far", away.max() > AWAY, f"The robot goes too far: {text}. When does braking help "
-         "most, early or late in the push?"),
-        ("strays", strayed > STRAYED, f"A foot moves too far: {text}. The robot pulls back harder "
-         "than necessary."),
-    ]) or Verdict(
-        True,
-        f"In simulation: {text}. The damping brakes while the push still acts. Then the spring "
-        "only has to bring the robot back.",
-    )  # fmt: skip
-
-
-def design_examples() -> list[Example]:
-    """Return examples for exercise 07.3."""
-    return [
-        ((400, 80, 10, 1e-3), ""), ((400, 70, 10, 1e-3), ""), ((500, 90, 30, 1e-3), ""),
-        ((200, 40, 10, 1e-3), "too_far"), ((100, 20, 10, 1e-3), "too_far_and_strays"),
-        ((25, 10, 10, 1e-3), "stays_away"), ((0, 80, 10, 1e-3), "creeps"),
-        ((10, 1, 1, 1e-3), "falls"), ((1e5, 20, 10, 1e-3), "strays"),
-        ((100, -20, 10, 1e-3), "negative"),
-        ((100, 20, 0, 1e-3), "negative"),
-    ]  # fmt: skip
-
-
 EXERCISES = (
     Exercise(
         name="07.1",
@@ -235,12 +166,24 @@ EXERCISES = (
     ),
     Exercise(
         name="07.3",
-        stub="design = np.array([100, 20, 10, 1e-3])  # kp, kd, weight; weight of the posture",
-        solution="design = np.array([400, 80, 10, 1e-3])",
-        judge=judge_design,
-        examples=design_examples,
-        explanation="The solution is a stiff spring with twice the critical damping. The damper "
-        "reacts to the velocity, which is there before any position error. A stiff spring "
-        "brings the robot home although the damper is slow.",
+        stub='fault = ["", ""]  # the line, and: frame, sign, transpose, missing term',
+        solution='fault = ["3", "transpose"]',
+        judge=BugHunt(
+            lines=("3",),
+            kind="transpose",
+            praise="J takes joint velocities to foot velocities. Forces go back through Jᵀ. In a "
+            "robot with as many motors as force components, the wrong matrix has the right shape.",
+            refuted={
+                "sign": "With a wrong sign, each entry would be the negative of the one by virtual "
+                "work. The same numbers are there, in other places.",
+                "frame": "In another frame, the numbers would be combinations of the right ones. "
+                "Here the numbers themselves are right.",
+                "missing term": "Without forces the torques are right, so h is there. And all "
+                "numbers of virtual work are there.",
+            },
+            elsewhere="Without forces the torques are right. Which line has the forces?",
+        ),
+        explanation="The torques that balance contact forces are -Jᵀλ, with the joint columns of "
+        "J. With three motors in each leg this block is square, and no error tells you.",
     ),
 )

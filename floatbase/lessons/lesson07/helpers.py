@@ -144,13 +144,3 @@ def leaning_controller(mu: float) -> fb.WholeBodyController:
     return fb.WholeBodyController(
         state.robot, contacts, [wish, *fb.standing_tasks(state)[1:]], facets=8, joint_limits=None
     )
-
-
-def tuned_controller(kp: float, kd: float, weight: float, posture: float) -> fb.WholeBodyController:
-    """Return the controller of exercise 07.3."""
-    state = standing_go2_eom().state
-    com = fb.CoMTask(state.com, kp=kp, kd=kd, weight=weight)
-    tasks = [com, fb.standing_tasks(state)[1], fb.PostureTask(state.q, weight=posture)]
-    return fb.WholeBodyController(
-        state.robot, fb.Contacts.points(state.robot, mu=MU), tasks, joint_limits=None
-    )

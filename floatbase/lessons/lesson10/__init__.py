@@ -4,7 +4,9 @@ from floatbase.lessons.lesson10.helpers import (
     PUSH_RECOVERY_WATCH_TIME,
     angular_momentum,
     make_controller,
+    make_short_controller,
     make_walking_controller,
     mean_load,
+    plan_pendulum,
 )
-from floatbase.lessons.lesson10.pictures import plot_loads, plot_push_recovery_maps, plot_step
+from floatbase.lessons.lesson10.pictures import as_svg, plot_curves, plot_stances

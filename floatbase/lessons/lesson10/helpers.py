@@ -1,8 +1,12 @@
-"""Lesson 10: controllers to push, and loads and angular momentum of a record."""
+"""Lesson 10: a pendulum with a horizon, controllers to push, and measures of a record."""
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
 import floatbase as fb
@@ -12,16 +16,68 @@ from floatbase.lessons.lesson08.helpers import MU
 from floatbase.simulation import Rollout
 
 PUSH_RECOVERY_WATCH_TIME = 4.0  # s: a robot that steps may fall late
+INTERVAL = 0.02  # s, of the pendulum
+END_WEIGHT = 100.0  # of ξ at the end, beside the positions p
 
 
-def make_controller() -> MPC:
+@cache
+def pendulum_rate() -> float:
+    """Return ω of the pendulum as high as the centre of mass of go2 [1/s]."""
+    robot = fb.load("go2")
+    return float(np.sqrt(robot.gravity / robot.standing().com[2]))
+
+
+def plan_pendulum(x: npt.ArrayLike, middles: npt.ArrayLike) -> Array:
+    """Compute the positions p of a horizon of the lesson's pendulum.
+
+    Parameters
+    ----------
+    x : array_like, shape (2,)
+        Position and velocity of the centre of mass [m, m/s].
+    middles : array_like, shape (n,)
+        Middle of the foot in each interval of 20 ms [m].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Positions that minimize the distances from the middles and, with a large weight, the
+        distance of the capture point ξ from the last middle at the end [m].
+
+    Notes
+    -----
+    The capture point at the end is a weighted sum of the positions: ξ grows by e^{ωΔt} in each
+    interval. The minimum is on the line through the middles in the direction of these weights.
+    """
+    return plan_with(x, middles)
+
+
+def plan_with(x: npt.ArrayLike, middles: npt.ArrayLike, **parts: Any) -> Array:
+    """Compute the positions of `plan_pendulum`, with parts of the problem replaced."""
+    (c, velocity), feet = np.asarray(x, dtype=np.float64), np.asarray(middles, dtype=np.float64)
+    n, growth = len(feet), np.exp(pendulum_rate() * INTERVAL)
+    problem = {
+        "weights": (1.0 - growth) * growth ** np.arange(n - 1.0, -1.0, -1.0),  # of p in ξ
+        "alone": growth**n * (c + velocity / pendulum_rate()),  # ξ at the end with p = 0
+        "near": feet, "goal": feet[-1], "end_weight": END_WEIGHT,
+    } | parts  # fmt: skip
+    weights, near, square = problem["weights"], problem["near"], problem["end_weight"] ** 2
+    miss = problem["goal"] - problem["alone"] - weights @ near
+    return np.asarray(near + square * miss / (1.0 + square * weights @ weights) * weights)
+
+
+def make_controller(n: int = 10) -> MPC:
     """Return the controller of the lesson's push-recovery map: go2 trotting in place, by `MPC`."""
     robot = fb.load("go2")
-    return MPC(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot, start=0.0))
+    return MPC(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot, start=0.0), n=n)
+
+
+def make_short_controller() -> MPC:
+    """Return the controller of the second map: the same `MPC` with one interval."""
+    return make_controller(n=1)
 
 
 def make_walking_controller() -> Walk:
-    """Return the controller of the second map: the same trot, by `Walk`."""
+    """Return the controller of the third map: the same trot, by `Walk`."""
     robot = fb.load("go2")
     return Walk(robot, fb.Contacts.points(robot, mu=MU), Gait.trot(robot, start=0.0))
 
