@@ -1,5 +1,6 @@
 """Lesson B: the bench is the package's cylinder, and effects go with their causes."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import judges
@@ -59,9 +60,8 @@ def test_the_longest_delay_does_not_depend_on_mass_and_legs():
     """solo12 has a sixth of go2's mass."""
     for name in ("go2", "solo12"):
         robot = judges.load(name)
-        controller = fb.WholeBodyController(
-            robot, fb.Contacts.points(robot), fb.standing_tasks(robot.standing(), kp=100, kd=20)
-        )
+        tasks = [replace(task, kp=100, kd=20) for task in fb.standing_tasks(robot.standing())]
+        controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
         push = [0.0, 30.0 * robot.mass / ROBOT.mass, 0.0]
         for delay, stands in ((0.065, True), (0.070, False)):
             sim = fb.Simulation(robot)
