@@ -1,12 +1,14 @@
-"""Lesson B: the bench is the package's cylinder, and pictures show it."""
+"""Lesson B: the bench is the package's cylinder, and effects go with their causes."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import judges
 import numpy as np
 import pytest
 
-from floatbase.actuators import Cylinders, HydraulicActuators, Hydraulics
+import floatbase as fb
+from floatbase.actuators import Cylinders, Delay, HydraulicActuators, Hydraulics
 from floatbase.lessons.lessonB import Bench, hold_then_turn, run_force_loop
 
 ROBOT = judges.load("go2")
@@ -51,3 +53,39 @@ def test_the_bench_has_the_torque_rate_of_the_cylinders():
         leaking = cylinders.pressure_rates(np.zeros(12), pressures, geometry, np.zeros(12))
         change = geometry.lever * cylinders.force(rates - leaking)
         assert bench.torque_rate(side) == pytest.approx(side * change[KNEE], rel=1e-9)
+
+
+@pytest.mark.front_end
+def test_the_longest_delay_does_not_depend_on_mass_and_legs():
+    """solo12 has a sixth of go2's mass."""
+    for name in ("go2", "solo12"):
+        robot = judges.load(name)
+        tasks = [replace(task, kp=100, kd=20) for task in fb.standing_tasks(robot.standing())]
+        controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
+        push = [0.0, 30.0 * robot.mass / ROBOT.mass, 0.0]
+        for delay, stands in ((0.065, True), (0.070, False)):
+            sim = fb.Simulation(robot)
+            fb.rollout(sim, controller, 0.5)
+            pushes, late = [fb.Push(push, start=sim.time + 0.1)], Delay(robot, delay)
+            outcome = fb.rollout(sim, controller, 3.0, pushes, actuators=late).outcome
+            assert (outcome == "completed") == stands, (name, delay, outcome)
+
+
+@pytest.mark.front_end
+def test_each_pair_of_joints_moves_the_body_its_own_way():
+    """Too much torque at the hips moves go2 right, at the thighs forwards, at the knees upwards."""
+    controller = fb.WholeBodyController(
+        ROBOT, fb.Contacts.points(ROBOT), fb.standing_tasks(ROBOT.standing())
+    )
+
+    class TooMuch:
+        def __init__(self, joint):
+            self.joints = np.arange(12) % 3 == joint
+
+        def step(self, tau, q, v, dt):
+            return tau + 0.8 * self.joints
+
+    for joint, axis, sign in ((0, 1, -1), (1, 0, 1), (2, 2, 1)):
+        record = fb.rollout(fb.Simulation(ROBOT), controller, 0.2, actuators=TooMuch(joint))
+        moved = sign * (record.com[-1] - record.com[0])[axis]
+        assert moved > 0.002

@@ -123,3 +123,21 @@ def test_the_solver_of_the_lesson_ends_at_every_step_of_a_large_push():
         return space(beta)
 
     assert run_with_push(SolverController(controller, solver), 150.0, 0.3).outcome == "completed"
+
+
+@pytest.mark.front_end
+def test_a_warm_start_saves_rounds_because_problems_follow_one_another():
+    controller = standing_controller()
+    record = run_with_push(controller, 100.0, 0.16)
+    problems = [controller.qp(record.state(i)) for i in range(40, 160)]
+
+    def rounds(order):
+        working, total = (), 0
+        for i in order:
+            run = active_set(problems[i], working_set=working)
+            total += len(run.phase_one) + len(run.iterations)
+            working = run.working_set
+        return total
+
+    in_order = rounds(range(120))
+    assert in_order < 1.2 * 120 < 4 * 120 < rounds(np.random.default_rng(1).permutation(120))

@@ -5,13 +5,11 @@ from floatbase.lessons.lessonB.helpers import (
     hold_then_turn,
     push_response,
     run_force_loop,
-    squat,
 )
 from floatbase.lessons.lessonB.pictures import (
     JOINT_VIEW,
     draw_cylinder,
     plot_com_sway,
-    plot_power,
     plot_torques,
     show_crank,
     show_torque_step,

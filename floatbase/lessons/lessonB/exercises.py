@@ -102,6 +102,10 @@ def _torque_mistakes() -> list[Mistake]:
          "This is the sine of 50 radians."),
         ("plus", force * a * b * np.sin(gamma) / _length(gamma, 1.0), "The law of cosines has a "
          "minus. At γ = 0 the crank points to the foot, and ℓ is shortest."),
+        ("pythagoras", force * a * b * np.sin(gamma) / np.hypot(a, b), "ℓ² = a² + b² holds only "
+         "for a right angle at the joint. Here the angle is 50°: use the law of cosines."),
+        ("right_angle", force * a * b * np.sin(gamma) / np.sqrt(a**2 - b**2), "ℓ² = a² - b² holds "
+         "only for a right angle between crank and cylinder. Use the law of cosines."),
         ("lever_alone", _torque() / force, "That is the lever arm, in m. The torque is the force "
          "of the piston times the lever arm."),
     ]  # fmt: skip

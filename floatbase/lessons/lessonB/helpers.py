@@ -8,13 +8,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 import floatbase as fb
-from floatbase._validation import Array
 from floatbase.actuators import Cylinders, HydraulicActuators, Hydraulics, HydraulicState
 from floatbase.lessons.lesson03 import standing_go2_eom
-from floatbase.simulation import Rollout
 
 # N·m: torque limit of go2's knee: what its cylinder exerts in the weaker direction where the lever
 # is longest
@@ -204,67 +201,3 @@ def push_response(kp: float, kd: float, bandwidth: float = 5.0) -> PushResponse:
     return PushResponse(
         record.outcome, float(np.linalg.norm(end, axis=1).max()), float(np.ptp(end, axis=0).max())
     )
-
-
-class _Metered(HydraulicActuators):
-    """Hydraulic actuators that record their powers, summed over the joints."""
-
-    def __init__(self, robot: fb.Robot):
-        super().__init__(robot)
-        self.powers: list[list[float]] = []
-
-    def step(
-        self,
-        tau_desired: npt.ArrayLike,
-        q_joints: npt.ArrayLike,
-        v_joints: npt.ArrayLike,
-        dt: float,
-    ) -> Array:
-        tau = super().step(tau_desired, q_joints, v_joints, dt)
-        p = self.cylinders.power(
-            self.state.opening,
-            self.state.pressures,
-            self.cylinders.geometry(q_joints),
-            np.asarray(v_joints, dtype=np.float64),
-        )
-        parts = (p.pump, p.joint, p.valve, p.leakage, p.stored)
-        self.powers.append([float(part.sum()) for part in parts])
-        return tau
-
-
-def squat(depth: float) -> tuple[Rollout, Array]:
-    """Let go2 squat once on hydraulic cylinders and record their powers.
-
-    Parameters
-    ----------
-    depth : float
-        Depth of the squat, from the standing posture down and up again within 1 s [m].
-
-    Returns
-    -------
-    record : Rollout
-        The record.
-    powers : ndarray, shape (1000, 5)
-        Powers of pump, joint, valve, leakage and storage every millisecond, summed over all
-        joints [W].
-    """
-    robot = fb.load("go2")
-    state, contacts, sim = robot.standing(), fb.Contacts.points(robot), fb.Simulation(robot)
-    standing = fb.WholeBodyController(robot, contacts, fb.standing_tasks(state))
-    fb.rollout(sim, standing, SETTLE)
-    start, rate = sim.time, 2.0 * np.pi  # s; rad/s
-
-    def path(t: float) -> tuple[Array, Array, Array]:
-        down, angle = np.array([0.0, 0.0, -depth / 2]), rate * (t - start)
-        return (
-            state.com + (1.0 - np.cos(angle)) * down,
-            rate * np.sin(angle) * down,
-            rate**2 * np.cos(angle) * down,
-        )
-
-    _, level, posture = fb.standing_tasks(state)
-    controller = fb.WholeBodyController(robot, contacts, [fb.CoMTask(path), level, posture])
-    actuators = _Metered(robot)
-    actuators.reset(standing(sim.q, sim.v).tau, sim.q[7:])
-    record = fb.rollout(sim, controller, 1.0, actuators=actuators)
-    return record, np.array(actuators.powers)

@@ -1,4 +1,4 @@
-"""Lesson B: a cylinder with its valve and crank, torques on the bench, sway of go2, and powers."""
+"""Lesson B: a cylinder with its valve and crank, torques on the bench, and sway of go2."""
 
 from __future__ import annotations
 
@@ -148,16 +148,6 @@ def plot_com_sway(records: Mapping[str, Rollout], side: float = 1.0) -> Axes:
         gone = 1000 * side * (record.com - record.com[0])[:, 1]
         _plot_curve(axis, i, record.time - record.time[0], gone, name)
     axis.axhline(0.0, color=hex_code(GREYS[2]), linewidth=1.0)
-    _add_legend(axis)
-    return axis
-
-
-def plot_power(watts: npt.ArrayLike, names: Sequence[str], step: float = 1e-3) -> Axes:
-    """Plot powers over time."""
-    axis = _axes("time [s]", "power [W]")
-    watts = np.asarray(watts)
-    for i, name in enumerate(names):
-        _plot_curve(axis, i, step * np.arange(len(watts)), watts[:, i], name)
     _add_legend(axis)
     return axis
 

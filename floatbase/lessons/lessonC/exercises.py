@@ -104,7 +104,7 @@ def _judge_guess(answer: Any) -> Verdict:
     return first_fault([
         ("motors", bool(faults) and only_motors, "The motors are far from their limits here. What "
          "does a push do to the feet?"),
-        ("corrections", bool(faults), f"With your list, {' and '.join(faults)}. Correct the guess "
+        ("corrections", bool(faults), f"With your list, {', and '.join(faults)}. Correct the guess "
          "as the solver would, and check again."),
     ]) or Verdict(
         True,
