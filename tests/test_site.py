@@ -243,8 +243,8 @@ def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path):
 
 
 class NoPictures:
-    def place(self, data):
-        return "<b>a scene</b>" if "scene" in data else None
+    def place(self, data, alt):
+        return f"<b>{alt}</b>" if "scene" in data else None
 
 
 def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
@@ -255,6 +255,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
         new_output("stream", name="stdout", text="\x1b[1mfound\x1b[0m"),
         new_output("display_data", {"scene": "…", widget: {}}),
         new_output("display_data", image, metadata=wide),
+        new_output("display_data", {"text/html": "<svg/>"}),
         new_output("display_data", {widget: {}, "text/plain": "Widget()"}),
     ]
     cells = [
@@ -262,7 +263,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
             "# 07 · A page\n\nIt *says* what (7) is, as lesson 06 and [lesson 08](08.ipynb) do.\n\n"
             "## Curve"
         ),
-        new_code_cell("draw()", outputs=outputs),
+        new_code_cell("draw()", outputs=outputs, metadata={"alt": "A <curve> falls."}),
         new_code_cell('predict("07.a", ...)', metadata={"prediction": "07.a"}),
         new_code_cell("draw()", metadata={"tags": ["picture"]}),
         new_code_cell("assert found", metadata={"tags": ["claims"]}),
@@ -273,10 +274,12 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
     made = prepare_lesson(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
     text, draw, asked, _, missing, opening, claims, _, stub, check, said = made.cells
     assert "what [(7)](#eq-7) is, as [lesson 06](06_cones.ipynb) and lesson 08 do" in text.source
-    printed, scene, image = draw.outputs
-    assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
+    printed, scene, image, drawing = draw.outputs
+    assert (printed.text, scene.data) == ("found", {"text/html": "<b>A <curve> falls.</b>"})
+    label = 'role="figure" aria-label="A &lt;curve&gt; falls."'
+    assert drawing.data == {"text/html": f"<div {label}><svg/></div>"}
     assert list(image.data) == ["image/png"]
-    assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
+    assert draw.metadata["mystnb"]["image"] == {"alt": "A <curve> falls.", "width": "300px"}
     assert all(choice in asked.source for choice in all_questions()["07.a"].choices)
     assert "(../installation.md)" in asked.source
     assert "without running" in missing.source and "1 claim," in opening.source
