@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 import nbformat
 import pytest
-from browsers import browser_of_a_file, needs_chromium
+from browsers import barriers, browser_of_a_file, needs_axe, needs_chromium, served
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import ImageFont
 
@@ -161,6 +161,29 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
     assert unnamed == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
     assert (said, wide) == ([], [])
+
+
+# one page of each kind; the first two have a live robot in a frame
+KINDS = (
+    "index.html", "live.html", "recall.html", "search.html", "lessons/06_friction_cones.html",
+    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "_static/lecture.html",
+)  # fmt: skip
+
+
+@needs_axe
+@needs_chromium
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_readers_with_a_screen_reader_or_weak_eyes_meet_no_serious_barrier(built, browser, scheme):
+    page, found = browser.new_page(color_scheme=scheme), {}
+    with served(built) as address:
+        for name in KINDS:
+            page.goto(f"{address}/{name}")
+            if name == "live.html" and (built / "_static" / "live").exists():
+                page.wait_for_selector("floatbase-robot iframe")
+                page.frames[-1].wait_for_selector("#panel input")
+            found[name] = barriers(page)
+    page.close()
+    assert {name: faults for name, faults in found.items() if faults} == {}
 
 
 SEARCHES = {
