@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from floatbase._browser import browser_path
+from floatbase.viewer.web import pages
 
 SCREENSHOTS = Path(__file__).parents[1] / "build" / "screenshots"
 CHROMIUM = browser_path()
@@ -19,6 +20,11 @@ FLAGS = [
     "--enable-unsafe-swiftshader", "--disable-quic",
     "--no-first-run", "--disable-background-networking", "--webgl-antialiasing-mode=none",
 ]  # fmt: skip
+AXE = pages.DIST.parent / "node_modules" / "axe-core" / "axe.min.js"
+needs_axe = pytest.mark.skipif(
+    not AXE.exists(),
+    reason="axe-core is not installed: run `npm ci` in floatbase/viewer/web to check the access",
+)
 needs_chromium = pytest.mark.skipif(
     CHROMIUM is None, reason="no Chromium on this machine: nothing was looked at in a browser"
 )
@@ -59,3 +65,17 @@ def served(folder: Path) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def browser_of_a_file() -> Iterator[Any]:
     yield from launched()
+
+
+def barriers(page: Any) -> list[str]:
+    """What axe finds in a page and its frames, with all folded parts open: serious or critical."""
+    for frame in page.frames:
+        frame.evaluate("for (const part of document.querySelectorAll('details')) part.open = true")
+        frame.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run({resultTypes: ['violations']})")["violations"]
+    return [
+        f"{one['impact']}: {one['help']}: {node['html'][:200]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+        for node in one["nodes"]
+    ]

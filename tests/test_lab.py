@@ -120,7 +120,8 @@ def _shows_images_when_reopened(page, lab, lesson):
     notebook.metadata.pop("widgets")  # as JupyterLab saves by default
     notebook.cells = [cell for cell in notebook.cells if "widget-view" in str(cell.get("outputs"))]
     for cell in notebook.cells:
-        cell.metadata.clear()  # its output is hidden, see LOOKS
+        for name in set(cell.metadata) - {"alt"}:
+            del cell.metadata[name]  # its output is hidden, see LOOKS
     nbformat.write(notebook, lesson.with_name("reopened.ipynb"))
     assert notebook.cells
     page.goto(f"{lab}/lab/workspaces/reopened/tree/{MY_FOLDER}/reopened.ipynb?token=a-test")
@@ -129,6 +130,12 @@ def _shows_images_when_reopened(page, lab, lesson):
         page.evaluate(f"(number) => {NOTEBOOK}.content.scrollToItem(number)", number)
         image = page.locator(".jp-Notebook .jp-Cell").nth(number).locator(".jp-OutputArea img")
         image.first.wait_for()
+        text = json.dumps(notebook.cells[number].metadata["alt"])
+        page.wait_for_function(
+            f"(number) => document.querySelectorAll('.jp-Notebook .jp-Cell')[number]"
+            f".querySelector('.jp-OutputArea img').alt === {text}",
+            arg=number,
+        )
     assert "Error displaying widget" not in page.locator(".jp-Notebook").inner_text()
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 from functools import cache
 from string import ascii_lowercase
 
@@ -205,3 +206,15 @@ def test_the_stated_time_is_the_computed_time_and_at_most_100_minutes(path):
     assert stated, "a lesson without a time"
     assert int(stated[1]) == lesson_minutes(path)
     assert int(stated[1]) <= (30 if path.stem.startswith("00") else 100)
+
+
+@LESSONS
+def test_each_picture_has_a_text_that_says_what_is_seen(path):
+    texts = {cell.id: cell.metadata.get("alt", "") for cell in code(path)}
+    pictures = {cell.id for cell in code(path) if tagged(cell, "picture")}
+    assert {name for name, text in texts.items() if text} == pictures
+    # a name, such as "3-D picture of go2", does not tell what is seen
+    short = [texts[name] for name in pictures if len(texts[name].split()) < 8]
+    marked = [texts[name] for name in pictures if re.search(r"[*$`\\]", texts[name])]
+    repeated = [text for text, count in Counter(texts.values()).items() if text and count > 1]
+    assert short + marked + repeated == []

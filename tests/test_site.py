@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 import nbformat
 import pytest
-from browsers import browser_of_a_file, needs_chromium
+from browsers import barriers, browser_of_a_file, needs_axe, needs_chromium, served
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import ImageFont
 
@@ -163,6 +163,29 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
     assert (said, wide) == ([], [])
 
 
+# one page of each kind; the first two have a live robot in a frame
+KINDS = (
+    "index.html", "live.html", "recall.html", "search.html", "lessons/06_friction_cones.html",
+    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "_static/lecture.html",
+)  # fmt: skip
+
+
+@needs_axe
+@needs_chromium
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_readers_with_a_screen_reader_or_weak_eyes_meet_no_serious_barrier(built, browser, scheme):
+    page, found = browser.new_page(color_scheme=scheme), {}
+    with served(built) as address:
+        for name in KINDS:
+            page.goto(f"{address}/{name}")
+            if name == "live.html" and (built / "_static" / "live").exists():
+                page.wait_for_selector("floatbase-robot iframe")
+                page.frames[-1].wait_for_selector("#panel input")
+            found[name] = barriers(page)
+    page.close()
+    assert {name: faults for name, faults in found.items() if faults} == {}
+
+
 SEARCHES = {
     "install": "Installation and troubleshooting",
     "jupyterhub": "Teaching with floatbase",
@@ -243,8 +266,8 @@ def test_a_second_build_replaces_its_own_files_and_no_others(tmp_path):
 
 
 class NoPictures:
-    def place(self, data):
-        return "<b>a scene</b>" if "scene" in data else None
+    def place(self, data, alt):
+        return f"<b>{alt}</b>" if "scene" in data else None
 
 
 def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
@@ -255,6 +278,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
         new_output("stream", name="stdout", text="\x1b[1mfound\x1b[0m"),
         new_output("display_data", {"scene": "…", widget: {}}),
         new_output("display_data", image, metadata=wide),
+        new_output("display_data", {"text/html": "<svg/>"}),
         new_output("display_data", {widget: {}, "text/plain": "Widget()"}),
     ]
     cells = [
@@ -262,7 +286,7 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
             "# 07 · A page\n\nIt *says* what (7) is, as lesson 06 and [lesson 08](08.ipynb) do.\n\n"
             "## Curve"
         ),
-        new_code_cell("draw()", outputs=outputs),
+        new_code_cell("draw()", outputs=outputs, metadata={"alt": "A <curve> falls."}),
         new_code_cell('predict("07.a", ...)', metadata={"prediction": "07.a"}),
         new_code_cell("draw()", metadata={"tags": ["picture"]}),
         new_code_cell("assert found", metadata={"tags": ["claims"]}),
@@ -273,10 +297,12 @@ def test_a_lesson_shows_what_was_found_and_says_what_needs_a_kernel():
     made = prepare_lesson(new_notebook(cells=cells), NoPictures(), {"06": "06_cones.ipynb"})
     text, draw, asked, _, missing, opening, claims, _, stub, check, said = made.cells
     assert "what [(7)](#eq-7) is, as [lesson 06](06_cones.ipynb) and lesson 08 do" in text.source
-    printed, scene, image = draw.outputs
-    assert (printed.text, scene.data) == ("found", {"text/html": "<b>a scene</b>"})
+    printed, scene, image, drawing = draw.outputs
+    assert (printed.text, scene.data) == ("found", {"text/html": "<b>A <curve> falls.</b>"})
+    label = 'role="figure" aria-label="A &lt;curve&gt; falls."'
+    assert drawing.data == {"text/html": f"<div {label}><svg/></div>"}
     assert list(image.data) == ["image/png"]
-    assert draw.metadata["mystnb"]["image"] == {"alt": "Figure: Curve", "width": "300px"}
+    assert draw.metadata["mystnb"]["image"] == {"alt": "A <curve> falls.", "width": "300px"}
     assert all(choice in asked.source for choice in all_questions()["07.a"].choices)
     assert "(../installation.md)" in asked.source
     assert "without running" in missing.source and "1 claim," in opening.source

@@ -191,7 +191,9 @@ def test_files_hold_the_outputs_and_shared_meshes_once(view, tmp_path):
     for title in ("one", "two"):
         bundle = view.show(view.robot.standing(), title=title)._repr_mimebundle_()
         data.append(bundle[static_export.MIME])
-        names.append(placed(made.place(bundle) or ""))
+        html = made.place(bundle, "It <stands>.") or ""
+        assert '<img alt="It &lt;stands&gt;." src="data:' in html and "aria-label" not in html
+        names.append(placed(html))
     made.write()
     files = {path.stem: path for path in (tmp_path / "pictures").glob("go2-*.js")}
     assert len(files) == 1
@@ -219,7 +221,9 @@ def test_only_pictures_are_placed_and_texts_are_escaped(tmp_path):
     made = Pictures(tmp_path)
     assert made.place({"text/html": "<b>3</b>"}) is None and made.place({}) is None
     panel = slider_panel(None, lambda **x: "<i>note</i>", **{"a<b": (0, 1, 2, '"s"')})
-    html = made.place(panel._repr_mimebundle_())
+    html = made.place(panel._repr_mimebundle_(), "A drawing")
+    assert html is not None and '<figure class="floatbase-picture" data' in html
+    assert ' aria-label="A drawing">' in html
     assert html is not None and "<i>note</i>" in html and "a&lt;b" in html
     assert "a<b" not in html and '"s"' not in html
 

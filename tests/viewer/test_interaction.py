@@ -4,6 +4,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from browsers import barriers, needs_axe
 from numpy.testing import assert_allclose
 
 from floatbase.viewer import Viewer
@@ -92,3 +93,29 @@ def test_views_parts_and_keys(framed):
         page.keyboard.press("h")
         assert_allclose(inner.evaluate(CAMERA), home, atol=1e-9)
     assert inner.evaluate("viewer.renderer.domElement.getAttribute('aria-label')") == "go2 standing"
+
+
+def test_the_tab_key_reaches_the_picture_and_shows_that_it_did(framed):
+    page, inner = framed
+    outlines = []
+    for _ in range(8):
+        page.keyboard.press("Tab")
+        outlines.append(inner.evaluate("getComputedStyle(document.activeElement).outlineWidth"))
+        if inner.evaluate("document.activeElement.tagName") == "CANVAS":
+            break
+    assert inner.evaluate("document.activeElement.tagName") == "CANVAS"
+    assert float(outlines[-1].removesuffix("px")) >= 2.0
+    home = inner.evaluate(CAMERA)
+    page.keyboard.press("ArrowLeft")
+    assert not np.allclose(inner.evaluate(CAMERA), home)
+    page.keyboard.press("Tab")  # it does not hold the focus
+    assert inner.evaluate("document.activeElement.tagName") != "CANVAS"
+
+
+@needs_axe
+def test_a_saved_picture_has_no_serious_barrier(framed):
+    page, inner = framed
+    page.goto(inner.url)
+    page.wait_for_function(DRAWN)
+    page.evaluate("document.getElementById('player').style.display = 'flex'")  # of a recording
+    assert barriers(page) == []

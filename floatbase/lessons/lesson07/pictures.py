@@ -29,7 +29,6 @@ def plot_one_foot() -> Axes:
     ax = plot_optimum(qp, (-45.0, 90.0, -10.0, 95.0))
     ax.plot(*goal, "+", color=GREYS[0], markersize=12, markeredgewidth=2)
     ax.set(xlabel="horizontal force [N]", ylabel="normal force [N]")
-    plt.close(ax.figure)  # type: ignore[arg-type]
     return ax
 
 

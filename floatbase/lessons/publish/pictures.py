@@ -36,8 +36,11 @@ class Pictures:
         self._folder = folder / _FOLDER
         self._placed: dict[str, tuple[dict[str, Any], list[bytes]]] = {}
 
-    def place(self, data: Mapping[str, Any]) -> str | None:
-        """Return HTML for the mimebundle of an output, or None if it has no picture."""
+    def place(self, data: Mapping[str, Any], alt: str = "") -> str | None:
+        """Return HTML for the mimebundle of an output, or None if it has no picture.
+
+        alt: says what is seen.
+        """
         if static_export.MIME not in data:
             return None
         description = dict(data[static_export.MIME])
@@ -45,7 +48,7 @@ class Pictures:
         del description["commands"]
         name = _file_name("picture", json.dumps(description, sort_keys=True).encode(), *commands)
         self._placed[name] = description, commands
-        return _figure_html(name, description)
+        return _figure_html(name, description, alt)
 
     def write(self) -> None:
         """Write the files, after all pictures have been placed."""
@@ -93,11 +96,13 @@ def _file_name(begin: str, *parts: bytes) -> str:
     return f"{begin}-{hashlib.sha256(protocol.frame(parts)).hexdigest()[:12]}"
 
 
-def _figure_html(name: str, description: dict[str, Any]) -> str:
+def _figure_html(name: str, description: dict[str, Any], alt: str) -> str:
     """Write the figure before its script loads: first images, note, and disabled controls."""
     heights, names, stills = (description[key] for key in ("heights", "names", "stills"))
     titles = description["titles"] or [""] * len(names)
-    scenes = "".join(map(_scene_html, heights, names, stills, titles))
+    alts = [title or name for title, name in zip(titles, names, strict=True)]
+    alts[:1] = [alt]  # it is about all scenes
+    scenes = "".join(map(_scene_html, heights, alts, stills, titles))
     if scenes:
         scenes = f'<div class="floatbase-scenes">{scenes}</div>'
     first = ",".join(str(control["first"]) for control in description["controls"])
@@ -105,12 +110,13 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
     if first in description["stops"]:
         note = description["notes"][description["stops"][first][0]]
     controls = "".join(map(_control_html, description["controls"]))
+    label = "" if scenes else f' aria-label="{html.escape(alt)}"'  # a drawing in the note
     words = html.escape(description["words"])
     if words:
         words = f'<p class="floatbase-words">{words}</p>'
     return (
         f'<figure class="floatbase-picture{" floatbase-beside" if description["beside"] else ""}" '
-        f'data-picture="{name}">'
+        f'data-picture="{name}"{label}>'
         f'<div class="floatbase-seen">{scenes}'
         f'<div class="floatbase-note" aria-live="polite">{note}</div></div>'
         f'<div class="floatbase-controls">{controls}</div>{words}'
@@ -118,11 +124,11 @@ def _figure_html(name: str, description: dict[str, Any]) -> str:
     )
 
 
-def _scene_html(height: int, robot: str, image: str, title: str) -> str:
+def _scene_html(height: int, alt: str, image: str, title: str) -> str:
     heading = f"<b>{html.escape(title)}</b>" if title else ""
     return (
         f'<div class="floatbase-scene" style="--height:{height}px">{heading}'
-        f'<div><img alt="3-D picture of {html.escape(robot)}" '
+        f'<div><img alt="{html.escape(alt)}" '
         f'src="data:image/png;base64,{image}"></div></div>'
     )
 

@@ -44,6 +44,10 @@ _MOVED = {
     "examples/": "examples/",
     "CHANGELOG.md": "changelog.md",
 }
+_FIRST_ALT = (
+    "A four-legged robot is pushed to its left. It lifts two feet at a time, places them further "
+    "to the left, and stands again."
+)
 _NO_LIVE = "This build has no live robots, because npm could not install MuJoCo for JavaScript."
 _FILE_LIST = ".floatbase-site"  # names of the files that the last build wrote
 _HEADINGS = re.compile(r"^##+ (\(\d+\)|§\S+|App\. [ABC]) .+$", re.MULTILINE)
@@ -143,7 +147,7 @@ def _first_picture(notebook: Any, pictures: Pictures) -> str:
     outputs = (output for cell in notebook.cells for output in cell.outputs)
     data = next(output.data for output in outputs if "data" in output)
     image = f"data:image/png;base64,{data.get('image/png')}"
-    return pictures.place(data) or f'<img alt="go2 steps after a push" src="{image}">'
+    return pictures.place(data, _FIRST_ALT) or f'<img alt="{_FIRST_ALT}" src="{image}">'
 
 
 def _toctrees(lessons: Sequence[Path]) -> str:

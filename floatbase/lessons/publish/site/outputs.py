@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import html
 import re
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -39,7 +40,6 @@ _NO_PICTURE = (
 _WIDGET_MIME = "application/vnd.jupyter.widget-view+json"
 _TERMINAL_CODES = re.compile(r"\x1b\[[0-9;]*m")
 _CHECKED = re.compile(r'check\("(\w+\.\w+)"')
-_HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 # their output is about the learner
 _LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)
 
@@ -47,7 +47,7 @@ _LEARNER_CALLS = re.compile(r"^(?:review|show_progress|reveal)\(", re.MULTILINE)
 class PicturePlacer(Protocol):
     """Protocol of an object that puts pictures into the site."""
 
-    def place(self, data: Mapping[str, Any]) -> str | None:
+    def place(self, data: Mapping[str, Any], alt: str) -> str | None:
         """Return HTML for the data of an output that holds a picture, or None."""
 
 
@@ -97,16 +97,15 @@ def _digest(data: bytes) -> str:
 
 def prepare_lesson(notebook: Any, pictures: PicturePlacer, lessons: Mapping[str, str]) -> Any:
     """Prepare a lesson for Sphinx, in place."""
-    about, heading = _description(notebook), ""
+    about = _description(notebook)
     shown = results(notebook.cells)
     cells: list[Any] = []
     for cell in fold_claims(fold_results(notebook.cells)):
         if cell.cell_type == "markdown":
-            heading = (_HEADING.findall(cell.source) or [heading])[-1]
             cell.source = add_links(cell.source, lessons)
             cells.append(cell)
             continue
-        cells.append(_prepare_code_cell(cell, heading, pictures, shown))
+        cells.append(_prepare_code_cell(cell, pictures, shown))
         if "picture" in cell.metadata.get("tags", []) and not cell.outputs:
             cells.append(new_markdown_cell(_live_lesson_note(_NO_PICTURE)))
     notebook.cells = cells
@@ -122,9 +121,7 @@ def _description(notebook: Any) -> str:
     return " ".join(re.sub(r"\[([^\]]*)\]\([^)]*\)|[*$`\\]", r"\1", paragraph).split())[:200]
 
 
-def _prepare_code_cell(
-    cell: Any, heading: str, pictures: PicturePlacer, shown: dict[str, Any]
-) -> Any:
+def _prepare_code_cell(cell: Any, pictures: PicturePlacer, shown: dict[str, Any]) -> Any:
     tags = cell.metadata.get("tags", [])
     if name := cell.metadata.get("prediction"):
         question = all_questions()[name]
@@ -144,8 +141,10 @@ def _prepare_code_cell(
         return new_markdown_cell(
             _live_lesson_note("Your predictions and solutions appear here in the live lesson")
         )
-    cell.outputs = [part for output in cell.outputs for part in _site_outputs(output, pictures)]
-    _describe_figure(cell, heading)
+    alt = cell.metadata.get("alt", "")
+    outputs = (_site_outputs(output, pictures, alt) for output in cell.outputs)
+    cell.outputs = [part for parts in outputs for part in parts]
+    _describe_figure(cell, alt)
     return cell
 
 
@@ -153,7 +152,7 @@ def _live_lesson_note(text: str) -> str:
     return f":::{{div}} live\n{text}: [how to run it]({RUN_PAGE}).\n:::"
 
 
-def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
+def _site_outputs(output: Any, pictures: PicturePlacer, alt: str) -> list[Any]:
     """Return the parts of an output that a page can show, as a list."""
     if output.output_type == "stream":
         output.text = _TERMINAL_CODES.sub("", output.text)
@@ -162,16 +161,19 @@ def _site_outputs(output: Any, pictures: PicturePlacer) -> list[Any]:
         return [output]
     if RESULT_MIME in output.data:
         return [new_output("stream", name="stdout", text=f"{output.data['text/plain']}\n")]
-    placed = pictures.place(output.data)
+    placed = pictures.place(output.data, alt)
     if placed is not None:
         return [new_output("display_data", {"text/html": placed})]
     data = {kind: value for kind, value in output.data.items() if kind != _WIDGET_MIME}
     if _WIDGET_MIME in output.data and "image/png" not in data:
         return []
+    if alt and "text/html" in data:
+        label = html.escape(alt)
+        data["text/html"] = f'<div role="figure" aria-label="{label}">{data["text/html"]}</div>'
     return [new_output("display_data", data, metadata=output.metadata)]
 
 
-def _describe_figure(cell: Any, heading: str) -> None:
+def _describe_figure(cell: Any, alt: str) -> None:
     """Add alternative text and width to a figure, which has two dots per pixel."""
     figures = [
         output
@@ -179,6 +181,7 @@ def _describe_figure(cell: Any, heading: str) -> None:
         if "image/png" in output.get("data", {}) and "text/html" not in output.data
     ]
     if figures:
-        image = {"alt": f"Figure: {re.sub(r'[*`$]', '', heading)}"}
         wide = figures[0].metadata.get("image/png", {}).get("width")
-        cell.metadata["mystnb"] = {"image": {**image, **({"width": f"{wide}px"} if wide else {})}}
+        cell.metadata["mystnb"] = {
+            "image": {"alt": alt, **({"width": f"{wide}px"} if wide else {})}
+        }

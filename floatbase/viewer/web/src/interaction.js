@@ -21,6 +21,9 @@ const KEYS = new Map(Object.entries({
   h: {view: "default"}, Home: {view: "default"}, " ": {play: true},
 }));
 
+const KEYS_TEXT = "Arrow keys turn the view. Plus and minus change the distance. " +
+  "H returns to the initial view. Space plays or pauses a recording.";
+
 // What a key does, undefined for nothing: turn or approach {orbit}, show a {view}, or {play}.
 export const actionOf = (key) => KEYS.get(key);
 
@@ -72,7 +75,9 @@ export function createInteraction(viewer, camera) {
   });
 
   canvas.tabIndex = 0;
-  canvas.setAttribute("role", "img");
+  canvas.setAttribute("role", "application"); // so that a screen reader passes the keys on
+  canvas.setAttribute("aria-roledescription", "3-D picture");
+  canvas.setAttribute("aria-description", KEYS_TEXT);
   canvas.onkeydown = (event) => {
     const action = actionOf(event.key), player = element("player");
     if (action?.orbit) orbit(action.orbit);

@@ -37,7 +37,7 @@ async function contents(name) {
 // One picture in its frame. show(scene) may be called at any time; scenes that were not drawn yet
 // are skipped.
 function startScene(place, {keys, commands}) {
-  const frame = make("iframe", {title: place.querySelector("img").alt});
+  const image = place.querySelector("img"), frame = make("iframe", {title: image.alt});
   let isReady = false, now = new Map(), goal = null, isSeen = true;
   const post = (message, ...more) => frame.contentWindow?.postMessage(message, "*", ...more);
   const send = () => {
@@ -55,6 +55,7 @@ function startScene(place, {keys, commands}) {
   });
   frame.src = new URL("viewer.html", BASE).href;
   place.append(frame);
+  image.alt = ""; // the frame over it says it
   return {
     show(scene) {
       goal = scene;
