@@ -141,7 +141,8 @@ export function createPanel(send) {
       show(now);
       report(name, now);
     };
-    made.setAttribute("aria-label", description);
+    const label = part === "shown" ? `${term}: ${description}` : description;
+    made.setAttribute("aria-label", label); // with the text that the button shows
     made.setAttribute("aria-disabled", disabled); // it keeps its title and the keyboard's focus
     show(value);
     if (!disabled) made.onclick = () => setValue(!value);

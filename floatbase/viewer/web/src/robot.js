@@ -219,7 +219,6 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   function draw(next) {
     frame = next;
     painter.draw(frame);
-    footView.draw(frame);
     const acting = frame.pushes.find(({start: begin}) => begin <= frame.time);
     if (dragged) painter.drawPush(dragged.world, dragged.force);
     else if (acting) painter.drawPush(placeOf(acting), acting.force);
@@ -235,6 +234,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     ));
   }
   function report() {
+    footView.draw(frame);
     // at the first picture there are no measured forces yet
     if (frame.time >= plotted + PLOT_PERIOD && frame.time > 0) {
       plotted = frame.time;

@@ -66,8 +66,8 @@ export function createFootView(viewer, robot, drawing, choose) {
     if (name !== null) title.textContent = pointName(name);
     choose(name);
   }
-  function pointed({clientX, clientY}) {
-    if (frame === null) return;
+  function pointed({clientX, clientY, type, buttons}) {
+    if (frame === null || (type === "pointermove" && buttons)) return; // none yet, or a drag
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
     const away = robot.points.map((_, i) => {
       const [x, y, z] = frame.contacts.slice(3 * i, 3 * i + 3);

@@ -1,0 +1,69 @@
+"""The page with a live robot in a browser: what an address opens, undo and reset everything."""
+
+import pytest
+from browsers import browser_of_a_file, needs_chromium, served
+
+from floatbase.live import folder
+
+pytestmark = [pytest.mark.front_end, pytest.mark.timeout(300), needs_chromium]
+browser = browser_of_a_file
+WALK = (
+    "#gait=trot&leg+of+Jᵀλ=rear+left+foot&gravity+in+the+model=off&show+gravity=on"
+    "&force+at=front+left+foot&torque+limits+[%25]=80&view=1.5,0.8,1.2,0,0.2,0&motion=0.5,-0.5"
+)
+SETTINGS = "() => floatbaseLive.frame().settings"
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    if folder.install_mujoco() is None:
+        pytest.skip("MuJoCo for JavaScript is not installed: no live robot was looked at")
+    made = tmp_path_factory.mktemp("live")
+    folder.write(made, ("go2",))
+    with served(made) as url:
+        yield f"{url}/robot.html"
+
+
+@pytest.fixture
+def page(browser):
+    opened = browser.new_page(viewport={"width": 800, "height": 500})
+    opened.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    yield opened
+    opened.close()
+
+
+def settings_at(page, address):
+    """Settings of the engine, after the page has opened an address."""
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_selector("body.live", timeout=60_000)
+    return page.evaluate(SETTINGS)
+
+
+def press(page, name):
+    page.evaluate("name => viewer.gui_controllers[name].fire()", name)
+    page.wait_for_timeout(1000)
+    return page.evaluate(SETTINGS)
+
+
+def test_a_copied_address_opens_the_same_walk_with_the_same_terms_and_view(page, address):
+    first = settings_at(page, address + WALK)
+    assert (first["gait"], first["leg"]) == ("trot", "RL_foot")
+    assert (first["assumedOff"], first["actualOff"], first["torque"]) == (["gravity"], [], 0.8)
+    assert first["speed"] < 0.0 and first["turn"] < 0.0
+    page.locator("#tools summary").click()
+    page.locator("#tools button", has_text="copy address").click()
+    page.wait_for_function("document.getElementById('tools').textContent.includes('copied')")
+    copied = page.evaluate("navigator.clipboard.readText()")
+    assert settings_at(page, copied) == first
+    assert page.locator(".foot").inner_text().startswith("front left foot")
+    assert page.evaluate("viewer.gui_controllers['show gravity'].getValue()")
+
+
+def test_reset_everything_restores_the_first_settings_and_undo_takes_it_back(page, address):
+    first, walking = settings_at(page, address), settings_at(page, address + WALK)
+    assert press(page, "reset everything") == first
+    kept = page.evaluate("[...new URLSearchParams(location.hash.slice(1)).keys()]")
+    assert set(kept) == {"view", "motion"}  # no setting
+    assert press(page, "undo") == walking
+    assert page.locator(".joystick").is_visible()
