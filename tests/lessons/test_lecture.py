@@ -31,7 +31,7 @@ def test_each_lesson_has_four_questions_with_a_result_and_a_reason():
 def test_reasons_come_from_the_lesson_or_from_the_metadata_of_the_question():
     reasons = {one.question.name: one.reason for some in QUESTIONS.values() for one in some}
     assert [name for name, reason in reasons.items() if reason[-1] in ":?"] == []
-    assert reasons["P.h"].startswith("At rest every foot pushes")
+    assert reasons["P.f"].startswith("At rest every foot pushes")
     assert reasons["02.c"][1:] in " ".join(text_of("02").split())
     known = all_questions().values()
     assert {one.name for one in known if one.reason} <= set(reasons)

@@ -1,12 +1,11 @@
 """Lesson 08, Standing, shifting, stepping, walking."""
 
 from floatbase.lessons.lesson08.helpers import (
+    foothold,
     largest_tilt,
     make_controller,
     mean_velocity,
-    run_crawl,
     run_go2,
-    smallest_support_margin,
     state_with_moved_body,
     uneven_stance,
 )

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.friction import wrench_set
+from floatbase.behaviours import support_margin
 from floatbase.lessons.exercises import Exercise
 from floatbase.lessons.judges import (
     Example,
@@ -18,47 +17,108 @@ from floatbase.lessons.judges import (
     NumericJudge,
     ShapeJudge,
     Verdict,
-    array_judge,
-    first_fault,
-    lasting_or_verdict,
+    function_or_verdict,
+    stopped,
 )
 from floatbase.lessons.lesson08.helpers import (
-    CRAWL_DURATION,
-    crawl,
-    run_crawl,
+    SWING_TIME,
+    feet_of_the_trot,
+    foothold,
+    parts_of_foothold,
     shortest_com_shift,
-    smallest_support_margin,
     uneven_stance,
 )
 
-FOOT = "FR_foot"  # of exercise 08.1
-PUSH = 0.1  # s, of exercise 08.2
-FAR, INSIDE, PRESSED = 600.0, 32.0, 80.0  # mm, mm and N: requirements of exercise 08.3
-SLOWEST = 0.05  # s: shorter swings and pauses are only a few control steps
+FOOT = "FR_foot"  # of exercise 08.2
+PUSH = 0.1  # s, of exercise 08.3
 
 
 # 08.1 ---------------------------------------------------------------------------------------------
 
 
+@cache
+def moments() -> tuple[tuple[str, fb.State, float, Array], ...]:
+    """Return the arguments with which the learner's `foothold` is called."""
+    stands = fb.load("go2").standing()
+    v = np.zeros(stands.robot.nv)
+    v[:3] = 0.4, -0.2, 0.1  # m/s
+    now = fb.State(stands.robot, stands.q, v)
+    return ("FR_foot", now, 0.1, np.array([0.3, 0.1])), ("RL_foot", now, 0.2, np.zeros(2))
+
+
+def _footholds(weights: tuple[float, float, float] = (1, 1, 1)) -> Array:
+    """Return the footholds at these moments; the weights of their three parts are 1 if right."""
+    places = [np.array(weights) @ parts_of_foothold(*moment) for moment in moments()]
+    heights = [feet_of_the_trot()[0][foot][2] for foot, *_ in moments()]
+    return np.column_stack([places, heights])
+
+
+def foothold_mistakes() -> list[Mistake]:
+    """Return the mistakes of exercise 08.1."""
+    right, now = _footholds(), moments()[0][1]
+    left = np.array([SWING_TIME - since for _, _, since, _ in moments()])[:, None]
+    by = left * now.com_velocity * [1, 1, 0]  # m, until touch-down
+    home = np.array([feet_of_the_trot()[0][foot] for foot, *_ in moments()])
+    return [
+        ("home", home, "There is no answer yet: this is the foot's place while go2 stands."),
+        ("no_body", _footholds((0, 1, 1)), "That is measured from the body. Add where the centre "
+         "of mass is at touch-down."),
+        ("no_step", _footholds((1, 0, 1)), "Your formula `step` is missing. So no error of the "
+         "velocity moves the foot."),
+        ("no_offset", _footholds((1, 1, 0)), "Both feet land at the same point. Add the foot's "
+         "usual place, seen from the middle of the feet."),
+        ("now", right - by, "That starts from where the centre of mass is now. The foot lands "
+         "T - since later."),
+        ("since", right - 2 * by + SWING_TIME * now.com_velocity * [1, 1, 0], "`since` has "
+         "passed already. What is left is T - since."),
+        ("height", right + [0, 0, 1] * (now.com + left * now.com_velocity - home), "That is at "
+         "the height of the centre of mass. The foot's own height is home[foot][2]."),
+    ]  # fmt: skip
+
+
+_FOOTHOLD = NumericJudge(
+    right=_footholds,
+    praise="Where the body will be, where the pendulum needs its support, and the foot's own side.",
+    mistakes=foothold_mistakes,
+)
+
+
+def judge_foothold(answer: Any) -> Verdict:
+    """Judge a function that returns where a foot is to land."""
+    program = function_or_verdict(answer)
+    if isinstance(program, Verdict):
+        return program
+    try:
+        return _FOOTHOLD([np.asarray(program(*moment)) for moment in moments()])
+    except Exception as error:  # whatever a learner's function raises
+        return stopped(error)
+
+
+def foothold_examples() -> list[Example]:
+    """Return examples for exercise 08.1."""
+    feet = [foot for foot, *_ in moments()]
+    answers = [(_footholds(), ""), *((wrong, hint) for hint, wrong, _ in foothold_mistakes())]
+    return [
+        *((lambda foot, *_, rows=rows: rows[feet.index(foot)], hint) for rows, hint in answers),
+        (foothold, ""), (lambda foot, *_: np.zeros(2), "shape"), (lambda foot: foot, "stops"),
+    ]  # fmt: skip
+
+
+# 08.2 ---------------------------------------------------------------------------------------------
+
+
 def com_shift() -> Array:
-    """Compute the shift [mm] to the nearest point of the support region of the other feet."""
-    state = uneven_stance()
-    corners = wrench_set(state, fb.Contacts.points(state.robot).without(FOOT)).support_region()
-    ways = []
-    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        part = np.clip((state.com[:2] - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-        ways.append(a + part * (b - a) - state.com[:2])
-    return 1e3 * min(ways, key=lambda way: float(np.linalg.norm(way)))
+    """Compute the shift [mm] to the nearest point of the edge between FL and RR."""
+    return 1e3 * shortest_com_shift(uneven_stance(), FOOT)
 
 
 def shift_mistakes() -> list[Mistake]:
-    """Return the mistakes of exercise 08.1."""
+    """Return the mistakes of exercise 08.2."""
     state = uneven_stance()
     usual, contacts = state.robot.standing(), fb.Contacts.points(state.robot)
     feet = dict(zip(contacts.names, contacts.positions(state), strict=True))
     middle = np.mean(list(feet.values()), axis=0)[:2]
-    triangle = np.mean([place[:2] for name, place in feet.items() if name != FOOT], axis=0)
-    way = 1e3 * shortest_com_shift(state, FOOT)
+    way = com_shift()
     return [
         ("zero", np.zeros(2), "There is no answer yet. Where is the centre of mass, and where may "
          "it be without FR?"),
@@ -77,16 +137,45 @@ def shift_mistakes() -> list[Mistake]:
          "feet belong both to the triangle without FR and to the triangle without RL?"),
         ("from_middle", 1e3 * shortest_com_shift(state, FOOT, lambda _: middle),
          "This shift starts in the middle of the feet. The weight acts at the centre of mass."),
-        ("to_middle", 1e3 * (triangle - state.com[:2]), "That ends in the middle of the three "
-         "feet, which is safe, but longer than necessary."),
-        ("straight_back", np.array([way @ way / way[0], 0.0]), "Straight back works, too, but it "
-         "is longer than necessary."),
-        ("straight_left", np.array([0.0, way @ way / way[1]]), "Straight to the left works, too, "
-         "but it is longer than necessary."),
     ]  # fmt: skip
 
 
-# 08.2 ---------------------------------------------------------------------------------------------
+_SHIFT = ShapeJudge(
+    NumericJudge(
+        right=com_shift,
+        praise="This is the nearest point of the diagonal FL-RR. There RL carries nothing, and a "
+        "little further on FR may lift.",
+        mistakes=shift_mistakes,
+        tolerance=0.02,
+    ),
+    {
+        (3,): "The answer has two numbers: heights do not count.",
+        (): "The answer has two numbers: how far forwards and how far to the left.",
+    },
+)
+
+
+def judge_shift(answer: Any) -> Verdict:
+    """Judge a shift, and say of a longer one that it works."""
+    verdict, state = _SHIFT(answer), uneven_stance()
+    if verdict.hint != "unknown":
+        return verdict
+    stand = fb.Contacts.points(state.robot).without(FOOT).positions(state)[:, :2]
+    moved = state.com[:2] + np.asarray(answer, dtype=np.float64) / 1e3
+    if support_margin(moved, stand) < -1e-4:  # m: an answer may be rounded to 0.1 mm
+        return verdict
+    text = "This works, too, but it is longer than necessary. Which point of the edge is nearest?"
+    return Verdict(False, text, "longer")
+
+
+def shift_examples() -> list[Example]:
+    """Return examples for exercise 08.2."""
+    x, y = com_shift()
+    longer = [np.array(way) for way in ((1.5 * x, 1.5 * y), (x + y * y / x, 0), (0, y + x * x / y))]
+    return [*_SHIFT.examples(), *((way, "longer") for way in longer)]
+
+
+# 08.3 ---------------------------------------------------------------------------------------------
 
 
 def _backwards() -> tuple[fb.State, float, float, float]:
@@ -96,22 +185,14 @@ def _backwards() -> tuple[fb.State, float, float, float]:
     return state, float(state.com[2]), float(-x.min()), float(x.max())
 
 
-@cache
 def hardest_push() -> float:
-    """Return the largest push [N] after which a pendulum above the hind feet does not pass them."""
+    """Return the push [N] that moves the capture point to the hind feet."""
     state, height, away, _ = _backwards()
-    rate = state.robot.gravity / height
-
-    def end(force: float) -> float:
-        start = [away, -force * PUSH / state.robot.mass]
-        run = solve_ivp(lambda _, y: [y[1], rate * y[0]], (0.0, 2.0), start, rtol=1e-10, atol=1e-12)
-        return float(run.y[0, -1])
-
-    return float(brentq(end, 0.0, 10.0 * state.robot.weight, xtol=1e-9))
+    return float(state.robot.mass * np.sqrt(state.robot.gravity / height) * away / PUSH)
 
 
 def push_mistakes() -> list[Mistake]:
-    """Return the mistakes of exercise 08.2."""
+    """Return the mistakes of exercise 08.3."""
     state, height, hind, front = _backwards()
     go2, robot = fb.load("go2").standing(), state.robot
     g, mass = robot.gravity, robot.mass
@@ -127,7 +208,6 @@ def push_mistakes() -> list[Mistake]:
          "centre of mass above the feet, not of the base."),
         ("omega_of_go2", mass * omega_of_go2 * hind / PUSH, "That is the ω of go2. The centre of "
          "mass of this robot is higher."),
-        ("mass_of_go2", go2.robot.mass * omega * hind / PUSH, "That is the mass of go2."),
         ("both_of_go2", go2.robot.mass * omega_of_go2 * hind / PUSH, "Mass and ω are those of "
          "go2."),
         ("forwards", mass * omega * front / PUSH, "That is a push forwards, towards the front "
@@ -140,93 +220,38 @@ def push_mistakes() -> list[Mistake]:
     ]  # fmt: skip
 
 
-# 08.3 ---------------------------------------------------------------------------------------------
-
-
-@array_judge((3,))
-def judge_crawl(given: Array) -> Verdict:
-    """Judge a crawl in simulation."""
-    swing, pause, forwards = given.tolist()
-    fault = first_fault([
-        ("too_short", min(swing, pause) < SLOWEST, "Swing and pause are times in seconds and must "
-         f"be {SLOWEST} s or more. The third number is the speed, m/s."),
-        ("backwards", forwards < 0, "The speed must not be negative: the crawl goes forwards."),
-    ])  # fmt: skip
-    if fault:
-        return fault
-    record = lasting_or_verdict(lambda: run_crawl(swing, pause, forwards))
-    if isinstance(record, Verdict):
-        return record
-    if (fraction := crawl(swing, pause, forwards).speed_fraction) < 1.0:
-        return Verdict(
-            False,
-            f"The legs are too short for steps of this length, so the robot crawls at only "
-            f"{fraction * forwards:.2f} m/s. A step is the speed times the period of the gait.",
-            "too_long_steps",
-        )
-    far = 1e3 * float((record.com[-1] - record.com[0])[0])
-    inside, pressed = 1e3 * smallest_support_margin(record), float(record.measured[:, 2::3].max())
-    text = (
-        f"{far:.0f} mm in {CRAWL_DURATION:g} s, margin at least {inside:.1f} mm, at most "
-        f"{pressed:.1f} N at a foot"
-    )
-    return first_fault([
-        ("slow_and_near", far < FAR and inside < INSIDE, "The crawl is too slow and too close to "
-         f"the edge: {text}. Speed and pause are two different numbers."),
-        ("slow", far < FAR, f"The crawl is too slow: {text}. Speed costs little: the other numbers "
-         "hardly change with it."),
-        ("near_and_stamps", inside < INSIDE and pressed > PRESSED, "The crawl is too close to the "
-         f"edge, and a foot stamps: {text}. Both need more time."),
-        ("near", inside < INSIDE, f"The crawl is too close to the edge: {text}. The centre of mass "
-         "shifts while all feet are on the ground."),
-        ("stamps", pressed > PRESSED, f"A foot stamps: {text}. How fast does a foot move in a step "
-         "of that length?"),
-    ]) or Verdict(
-        True,
-        f"In simulation: {text}. Pauses give margin, and slow swings give quiet feet. The price is "
-        "longer steps.",
-    )  # fmt: skip
-
-
-def crawl_examples() -> list[Example]:
-    """Return examples for exercise 08.3."""
-    return [
-        ((0.25, 0.22, 0.14), ""), ((0.3, 0.1, 0.08), "slow_and_near"), ((0.3, 0.25, 0.08), "slow"),
-        ((0.3, 0.1, 0.13), "near"),
-        ((0.15, 0.1, 0.15), "near_and_stamps"), ((0.15, 0.3, 0.13), "stamps"),
-        ((2.0, 0.1, 0.4), "too_long_steps"),
-        ((300.0, 250.0, -0.1), "backwards"),
-        ((0.01, 0.2, 0.1), "too_short"),
-    ]  # fmt: skip
-
-
 EXERCISES = (
     Exercise(
         name="08.1",
+        stub="def foothold(foot, now, since, desired):\n"
+        '    """Where this foot is to land, (3,), m."""\n'
+        "    return home[foot]  # replace: your rule",
+        solution="def foothold(foot, now, since, desired):\n"
+        "    lands = now.com + now.com_velocity * (T - since)\n"
+        "    beside = home[foot][:2] - middle\n"
+        "    x, y = lands[:2] + step(now.com_velocity[:2], desired) + beside\n"
+        "    return np.array([x, y, home[foot][2]])",
+        judge=judge_foothold,
+        examples=foothold_examples,
+        explanation="The foot lands T - since later. By then the centre of mass has moved on, and "
+        "`step` says where the pendulum needs its support from there.",
+        namespace=lambda: {"home": feet_of_the_trot()[0]},
+    ),
+    Exercise(
+        name="08.2",
         stub="way = np.zeros(2)  # replace: forwards and to the left, mm",
         solution="feet = dict(zip(contacts.names, contacts.positions(uneven)))\n"
         'a, b = feet["FL_foot"][:2], feet["RR_foot"][:2]\n'
         "across = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)\n"
         "way = 1000 * ((a - uneven.com[:2]) @ across) * across",
-        judge=ShapeJudge(
-            NumericJudge(
-                right=com_shift,
-                praise="This is the nearest point of the diagonal FL-RR. There RL carries "
-                "nothing, and a little further on FR may lift.",
-                mistakes=shift_mistakes,
-                tolerance=0.02,
-            ),
-            {
-                (3,): "The answer has two numbers: heights do not count.",
-                (): "The answer has two numbers: how far forwards and how far to the left.",
-            },
-        ),
+        judge=judge_shift,
+        examples=shift_examples,
         explanation="Without FR the triangle ends at the line from FL to RR. The shortest way "
         "to a line is perpendicular to it.",
         namespace=lambda: {"uneven": uneven_stance()},
     ),
     Exercise(
-        name="08.2",
+        name="08.3",
         stub="force = 0.0  # replace: N",
         solution='arm = fb.load("anymal_kinova")\n'
         "stands = arm.standing()\n"
@@ -241,14 +266,5 @@ EXERCISES = (
         ),
         explanation="The push gives the velocity v = F T / m. The capture point x + v/ω must "
         "not pass the hind feet.",
-    ),
-    Exercise(
-        name="08.3",
-        stub="design = np.array([0.3, 0.1, 0.08])  # swing, pause, s; speed, m/s",
-        solution="design = np.array([0.25, 0.22, 0.14])",
-        judge=judge_crawl,
-        examples=crawl_examples,
-        explanation="Pauses give margin, because x_c shifts during them. Slow swings give quiet "
-        "feet. Speed costs little: the steps become longer.",
     ),
 )

@@ -1,8 +1,7 @@
-"""Lesson 08: stances with a shifted body, measures of a record, and crawls."""
+"""Lesson 08: stances with a shifted body, footholds of a trot, and measures of a record."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from functools import cache
 
@@ -11,18 +10,15 @@ import numpy.typing as npt
 
 import floatbase as fb
 from floatbase._validation import Array
-from floatbase.behaviours import Gait, Stand, Walk, support_margin
-from floatbase.errors import SimulationWarning
+from floatbase.behaviours import Gait, Stand
 from floatbase.lessons.lesson03 import standing_go2_eom
 from floatbase.lessons.lesson06 import state_with_feet_at
 from floatbase.simulation import Rollout
 
 MU = 0.7
 PERIOD = 2e-3  # s, control period of the records: half the work of 1 ms, with the same results
-SLOW_PERIOD = 4e-3  # s, of exercise 08.4: the quantities it judges change by about 2 %
-FOOT_SETBACK = 0.06  # m: how much further back RR stands in exercise 08.1
-CRAWL_DURATION = 6.0  # s of exercise 08.4
-_ROW_STEP = 3  # the margin is computed in every third row: every 12 ms of a crawl
+FOOT_SETBACK = 0.06  # m: how much further back RR stands in exercise 08.2
+SWING_TIME = 0.25  # s: duration of each step of the lesson's trot
 
 
 def make_controller() -> Stand:
@@ -123,29 +119,48 @@ def mean_velocity(record: Rollout, seconds: float = 0.5) -> Array:
     return mean
 
 
-def smallest_support_margin(record: Rollout) -> float:
-    """Return the smallest margin of the centre of mass in a record [m]."""
-    names = record.contacts.names
-    margins = []
-    for i in range(0, len(record), _ROW_STEP):
-        stand = [names.index(name) for name in record.contacts_at(i).names]
-        margins.append(support_margin(record.com[i, :2], record.foot_positions[i, stand, :2]))
-    return min(margins)
-
-
 @cache
-def run_crawl(swing: float, pause: float, forwards: float) -> Rollout:
-    """Simulate 6 s of a crawl."""
-    return run_go2(crawl(swing, pause, forwards), CRAWL_DURATION, period=SLOW_PERIOD)
+def feet_of_the_trot() -> tuple[dict[str, Array], Array]:
+    """Return the places of the standing feet (3,) and their mean from above (2,) [m]."""
+    state = standing_go2_eom().state
+    contacts = fb.Contacts.points(state.robot)
+    home = {foot: state.point(foot) for foot in contacts.names}
+    return home, contacts.positions(state).mean(axis=0)[:2]
 
 
-def crawl(swing: float, pause: float, forwards: float) -> Walk:
-    """Return the controller of `run_crawl`."""
-    robot = standing_go2_eom().robot
-    gait = Gait.crawl(robot, swing, pause, start=0.5)
-    with warnings.catch_warnings():  # the verdict reports a limited speed
-        warnings.simplefilter("ignore", SimulationWarning)
-        return Walk(robot, fb.Contacts.points(robot, mu=MU), gait, (forwards, 0.0))
+def parts_of_foothold(
+    foot: str, now: fb.State, since: float, desired: npt.ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Return where the body is at touch-down, the step ahead of it, and the foot beside it."""
+    home, middle = feet_of_the_trot()
+    v, v_end = now.com_velocity[:2], np.asarray(desired, dtype=np.float64)
+    omega = np.sqrt(now.robot.gravity / standing_go2_eom().state.com[2])
+    neutral = v_end / omega * np.tanh(omega * SWING_TIME / 2)
+    ahead = neutral + (v - v_end) / (omega * np.tanh(omega * SWING_TIME))
+    return now.com[:2] + v * (SWING_TIME - since), ahead, home[foot][:2] - middle
+
+
+def foothold(foot: str, now: fb.State, since: float, desired: npt.ArrayLike) -> Array:
+    """Return where a foot of the lesson's trot is to land.
+
+    Parameters
+    ----------
+    foot : str
+        Name of the foot.
+    now : State
+        Present state of go2.
+    since : float
+        Time since the foot lifted off [s].
+    desired : array_like, shape (2,)
+        Desired horizontal velocity [m/s].
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Place of the foot's centre in the world frame [m].
+    """
+    place = np.sum(parts_of_foothold(foot, now, since, desired), axis=0)
+    return np.append(place, feet_of_the_trot()[0][foot][2])
 
 
 def opposite_foot(foot: str) -> str:

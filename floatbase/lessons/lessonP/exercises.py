@@ -111,8 +111,6 @@ def _shift_mistakes() -> list[Mistake]:
          "FR and RL, which are to be lifted."),
         ("sign", -right, "The direction is wrong: go from the centre of mass to the line, not from "
          "the line."),
-        ("not_shortest", (to_front + to_rear) / 2.0, "That is above the diagonal, but it is not "
-         "the shortest shift. The shortest line meets the diagonal at a right angle."),
         ("on_FL", to_front, "That is above the foot FL. Standing on one end of the diagonal is "
          "harder than on both."),
         ("on_RR", to_rear, "That is above the foot RR. Standing on one end of the diagonal is "
@@ -135,8 +133,16 @@ def _judge_shift(given: Array) -> Verdict:
     if abs(given[2]) > HEIGHT:
         text = "Seen from above, the centre of mass keeps its height, so the third number is 0."
         return Verdict(False, text, "height")
-    if np.abs(given - _nearest()).max() > FULL_MILLIMETRE:
-        return _SHIFT(given)
+    off = given - _nearest()
+    if np.abs(off).max() > FULL_MILLIMETRE:
+        verdict, across = _SHIFT(given), _nearest() / np.linalg.norm(_nearest())
+        if not verdict.hint.startswith("unknown") or abs(across @ off) > FULL_MILLIMETRE:
+            return verdict
+        text = (
+            "That is above the diagonal, but it is not the shortest shift. The shortest line meets "
+            "the diagonal at a right angle."
+        )
+        return Verdict(False, text, "not_shortest")
     times = [time_on_two_feet(shift) for shift in (np.zeros(3), given)]
     if times[1] < TIME_ON_TWO_FEET:
         text = f"In simulation the robot stood on two feet for only {times[1]:.1f} s."
@@ -162,8 +168,12 @@ def _stiffnesses() -> list[Example]:
 
 
 def _shifts() -> list[Example]:
-    rounded_shift = np.round(_nearest(), 3)
-    return [*_SHIFT.examples(), (rounded_shift, ""), (_nearest() + [0.0, 0.0, 0.1], "height")]
+    x, y, _ = right = _nearest()
+    longer = [[x + y * y / x, 0.0, 0.0], [0.0, y + x * x / y, 0.0]]  # straight ahead, to the side
+    return [
+        *_SHIFT.examples(), (np.round(right, 3), ""), (right + [0.0, 0.0, 0.1], "height"),
+        *((way, "not_shortest") for way in longer),
+    ]  # fmt: skip
 
 
 def _mass_mistakes() -> list[Mistake]:

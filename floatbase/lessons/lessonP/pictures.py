@@ -34,16 +34,10 @@ def plot_gains(gains: Sequence[float], moved: Sequence[float], border: float) ->
     x, y = np.asarray(gains, dtype=float), np.asarray(moved, dtype=float)
     stands = np.isfinite(y)
     top = 1.3 * y[stands].max(initial=1.0)
-    axis.semilogx(x[stands], y[stands], "o-", color=hex_code(GREYS[0]), label="stands")
+    dark = hex_code(GREYS[0])
+    axis.semilogx(x[stands], y[stands], "o-", label="stands", color=dark)
     if not stands.all():
-        axis.plot(
-            x[~stands],
-            np.full((~stands).sum(), top),
-            "x",
-            color=hex_code(GREYS[0]),
-            ms=9,
-            label="falls",
-        )
+        axis.plot(x[~stands], 0.0 * x[~stands] + top, "x", ms=9, label="falls", color=dark)
     axis.axvline(border, color=hex_code(GREYS[1]), linestyle="--", label="4 ω²")
     axis.set_xticks(x, [f"{gain:g}" for gain in x])
     axis.minorticks_off()

@@ -89,7 +89,7 @@ def _kicks() -> list[Mistake]:
     (push,) = faultless_cases(KICK_SEED)[1].pushes
     return [
         ("zero", np.zeros(3), "There is no answer yet. Take the first three columns of what is "
-         "missing in (7), and sum over time."),
+         "missing from (7), and sum over time."),
         ("base_axes", 0.002 * _residual()[0].sum(axis=0), "These are the axes of the base, which "
          "turn. Convert each row to the world's axes by R before you sum."),
         ("no_duration", _residual()[1].sum(axis=0), "A sum of forces is not an impulse yet. Each "
@@ -277,7 +277,7 @@ EXERCISES = (
             },
         ),
         examples=lambda: [(0.002 * _residual()[1].sum(axis=0), "")],
-        explanation="Whatever touches the robot is missing in (7). No motor acts in the first "
+        explanation="Whatever touches the robot is missing from (7). No motor acts in the first "
         "rows, so no motor can be the cause.",
         namespace=lambda: {"kicked": kicked_box(), "required_forces": required_forces},
     ),

@@ -44,12 +44,12 @@ def show_instant(view: Viewer, box: BlackBox, missed: Array, time: float) -> str
     left = float(np.linalg.norm(missed[i, :3]))
     return (
         f"planned and measured forces differ by {gap_text} N; "
-        f"{left if left >= _MIN_TOLERANCE else 0:.0f} N is missing in (7) on the base"
+        f"{left if left >= _MIN_TOLERANCE else 0:.0f} N is missing from (7) on the base"
     )
 
 
 def plot_residual_force(box: BlackBox, missed: npt.ArrayLike) -> Figure:
-    """Plot the force on the base that is missing in (7), with the weight for comparison."""
+    """Plot the force on the base that is missing from (7), with the weight for comparison."""
     forces = np.linalg.norm(np.asarray(missed)[:, :3], axis=1)
     figure, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
     ax.axhline(box.robot.weight, color=hex_code(GREYS[1]), linestyle="--", label="weight")
