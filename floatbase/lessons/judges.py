@@ -171,6 +171,8 @@ _GENERAL = {
     "transpose": "This is the transpose of the answer.",
     "unknown": "This is not right, and it is not a mistake that this check recognises. Check "
     "the units, then read the statement again.",
+    "unknown_count": "This is not right, and it is not a mistake that this check recognises. "
+    "What is counted? Is anything left out or counted twice?",
 }
 
 
@@ -195,12 +197,15 @@ class NumericJudge:
     tolerance : float, optional
         Relative tolerance: two values are equal if they differ by at most this fraction of the
         largest entry of the right value [-].
+    is_count : bool, optional
+        Whether the answer is a count, which has neither a sign nor a unit.
     """
 
     right: Callable[[], Any]
     praise: str
     mistakes: Callable[[], Iterable[Mistake]] = tuple
     tolerance: float = 1e-3
+    is_count: bool = False
 
     def __call__(self, answer: Any) -> Verdict:
         """Judge an answer."""
@@ -223,6 +228,8 @@ class NumericJudge:
 
     def _of_any_answer(self, given: Array, right: Array) -> str:
         """Return the general hint, a key of `_GENERAL`, for a wrong answer of no known kind."""
+        if self.is_count:
+            return "unknown_count"
         if self._equal(given, right, NEAR_MISS):
             return "nearly"
         if self._equal(given, -right):

@@ -91,6 +91,10 @@ def test_answers_are_told_in_any_exercise_what_is_wrong_with_any_answer(answer, 
     assert NumericJudge(right=lambda: [[1.0, 2.0], [3.0, 4.0]], praise="")(answer).hint == hint
 
 
+def test_a_wrong_count_is_told_to_say_what_it_counts():
+    assert EXERCISES["10.2"].judge(1).hint == "unknown_count"
+
+
 def test_a_cost_is_told_from_what_is_none():
     cost = next(answer for answer, hint in examples("04.3") if not hint)
     assert EXERCISES["04.3"].judge(cost.minimiser()).hint == "no_cost"

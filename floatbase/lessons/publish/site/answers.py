@@ -64,12 +64,13 @@ def exercise_form(exercise: Exercise) -> Any | None:
         value = np.asarray(wrong, dtype=np.float64)
         if value.shape == right.shape:
             cases.append({"right": _interval(value, judge.tolerance), "text": text})
-    near, sign = max(NEAR_MISS, judge.tolerance), -right
-    cases.append({"right": _interval(right, near), "text": general_hint("nearly")})
-    cases.append({"right": _interval(sign, judge.tolerance), "text": general_hint("sign")})
+    if not judge.is_count:
+        near, sign = max(NEAR_MISS, judge.tolerance), -right
+        cases.append({"right": _interval(right, near), "text": general_hint("nearly")})
+        cases.append({"right": _interval(sign, judge.tolerance), "text": general_hint("sign")})
     data = {
         "name": exercise.name, "unit": "", "count": right.size, "choices": [], "cases": cases,
-        "otherwise": general_hint("unknown"),
+        "otherwise": general_hint("unknown_count" if judge.is_count else "unknown"),
     }  # fmt: skip
     return element("exercise", data, f"{exercise.name}: you can check your answer in {_LINK}.")
 
