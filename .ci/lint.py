@@ -342,7 +342,7 @@ def _numbers(ranges: str) -> set[str]:
 
 # largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
 BUDGETS = {
-    "library": 17060, "lessons": 12700, "viewer": 4100, "tests": 22930, "benchmarks": 2300,
+    "library": 17060, "lessons": 12700, "viewer": 4100, "tests": 23060, "benchmarks": 2340,
     "docstrings": 16000,
 }  # fmt: skip
 

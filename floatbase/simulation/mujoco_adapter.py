@@ -259,12 +259,18 @@ class MujocoAdapter:
         limits = [largest_torque(model, joint) for joint in self._joints]
         is_weaker = np.array(limits) < (1.0 - _TOLERANCE) * robot.torque_limits
         weaker = np.array(robot.joint_names)[is_weaker].tolist()
+        motors = [motor for joint in self._joints for motor in motors_of(model, joint)]
+        has_springs = model.jnt_stiffness[self._joints].any()
         place, gravity = mount.translation.round(3), mount.rotation.T @ model.opt.gravity
         pull = np.abs(gravity - robot.model.gravity.linear).max()
         differences = {
             f"weighs {theirs:.4g} kg instead of {mass:.4g} kg": abs(theirs / mass - 1) > _TOLERANCE,
             f"also has the joints {', '.join(others)}": bool(others),
             f"has weaker motors at {', '.join(weaker)}": bool(weaker),
+            "has motors that follow ctrl late (actuator_dyntype)": model.actuator_dyntype[
+                motors
+            ].any(),
+            "has springs at its joints": has_springs,
             f"is under a gravity of {gravity.round(3)} m/s²": pull > _TOLERANCE * robot.gravity,
             f"has its base at {place} m, but targets are relative to it": not mount.isIdentity(
                 _LARGEST_DIFFERENCE

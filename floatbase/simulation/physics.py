@@ -369,7 +369,10 @@ class Simulation:
         mujoco.MjSpec
             The description from which `model` was compiled. `sim.spec().to_xml()` is its XML.
         """
-        return build_spec(self.robot, self._world)
+        spec = build_spec(self.robot, self._world)
+        for mesh in spec.meshes:  # the hulls of links
+            spec.geom(mesh.name).conaffinity = int(self._link_collisions)
+        return spec
 
     def step(self, tau: npt.ArrayLike, pushes: tuple[Push, ...] = ()) -> None:
         """Advance the simulation by one timestep.

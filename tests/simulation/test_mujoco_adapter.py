@@ -211,6 +211,14 @@ def heavier(spec: mujoco.MjSpec) -> None:
     spec.body("trunk").mass = 6.0
 
 
+def springy(spec: mujoco.MjSpec) -> None:
+    spec.joint("RR_pitch").stiffness[0] = 5.0
+
+
+def late(spec: mujoco.MjSpec) -> None:
+    spec.actuators[0].dyntype, spec.actuators[0].dynprm[0] = mujoco.mjtDyn.mjDYN_FILTER, 0.1
+
+
 def weaker(spec: mujoco.MjSpec) -> None:
     spec.actuator("RR_pitch").ctrlrange = [-1.0, 1.0]
 
@@ -222,7 +230,14 @@ def armed(spec: mujoco.MjSpec) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "sign"), [(heavier, "10.8 kg"), (weaker, "RR_pitch"), (armed, "dog/shoulder")]
+    ("change", "sign"),
+    [
+        (heavier, "10.8 kg"),
+        (weaker, "RR_pitch"),
+        (springy, "springs"),
+        (late, "dyntype"),
+        (armed, "dog/shoulder"),
+    ],
 )
 def test_an_adapter_warns_about_differences_that_a_controller_should_know(dog, change, sign):
     with pytest.warns(SimulationWarning, match=sign):

@@ -323,6 +323,6 @@ def test_a_copy_of_a_simulation_falls_as_the_simulation_does():
 def test_the_description_of_a_simulation_compiles_to_its_model():
     sim = fb.Simulation(judges.load("go2"), 0.4, 2e-3)
     made = sim.spec().compile()
-    for part in ("body_mass", "geom_friction", "actuator_forcerange"):
+    for part in ("body_mass", "geom_friction", "geom_conaffinity", "actuator_forcerange"):
         assert np.array_equal(getattr(made, part), getattr(sim.model, part))
     assert made.opt.timestep == 2e-3
