@@ -9,20 +9,13 @@ import pinocchio as pin
 import pytest
 
 import floatbase as fb
+from floatbase.actuators import FirstOrderLag
 from floatbase.behaviours import Gait, Jump, Stand, Walk, support_margin
 from floatbase.control import JointLimits
 from floatbase.lessons.lesson08 import run_go2
-from floatbase.lessons.lessonX.cases import (
-    PERIOD,
-    InjectedFault,
-    ModelMismatch,
-    Twist,
-    record_box,
-    standing_on,
-    twist_controller,
-)
+from floatbase.lessons.lessonX import InjectedFault, crash_test, random_cases, record_box
 from floatbase.lessons.publish import lesson_notebooks, read_notebook
-from floatbase.playground import Perturbation, PerturbedSimulation
+from floatbase.playground import ModelMismatch, Perturbation, PerturbedSimulation
 from floatbase.robots import Foot
 
 pytestmark = pytest.mark.front_end  # 20 s of simulations
@@ -42,6 +35,31 @@ def lesson08():
             if cell.source.startswith("from floatbase.lessons.lesson08 import mean_velocity"):
                 return defined
     raise AssertionError("lesson 08 has no trot")
+
+
+def test_angular_momentum_explains_most_of_the_difference_between_go2_and_its_pendulum():
+    lesson = lesson08()
+    record, away, omega = (lesson[name] for name in ("record", "away", "omega"))
+    along = record.foot_positions[0, 0] - record.foot_positions[0, 1]  # from RR to FL
+    axis = np.array([*along[:2], 0.0]) / np.linalg.norm(along[:2])
+    momentum = [
+        pin.computeCentroidalMomentum(GO2.model, GO2.model.createData(), q, v).angular @ axis
+        for q, v in zip(np.array(record.q), np.array(record.v), strict=True)
+    ]
+    taken = np.gradient(momentum, record.time) / (GO2.mass * GO2.standing().com[2])
+
+    def late(brake):  # s, until the pendulum is 50 mm away
+        state, step = np.array([away[0], 0.0]), record.time[1] - record.time[0]
+        for i in range(len(record)):
+            state[1] += step * (omega**2 * state[0] - brake[i])
+            state[0] += step * state[1]
+            if state[0] > 0.05:
+                return record.time[i]
+        return np.inf
+
+    measured = record.time[np.argmax(away > 0.05)]
+    alone = late(0.0 * taken)
+    assert measured > 1.03 * alone and late(taken) - alone > 0.5 * (measured - alone)
 
 
 def test_a_trot_needs_footholds_that_are_computed_in_the_air():
@@ -186,25 +204,32 @@ class ChangedTorques:
         return self.first + self.gain * (self.late.pop(0) - self.first)
 
 
-def test_the_delay_of_slow_motors_fells_the_robot_not_the_smaller_command_nor_the_floor():
-    twist = Twist()
-    contacts = fb.Contacts.points(GO2, 1.2, normals=twist.normal)
-    state, outcomes = standing_on(GO2, twist.normal), []
-    for steps, gain in ((0, 5 / 6), (20, 1.0)):
-        pilot = twist_controller(state, contacts, twist, ModelMismatch())
-        sim = fb.Simulation(GO2, 1.2)
-        sim.reset(state)
-        motors = ChangedTorques(pilot(state.q, state.v, 0.0).tau, steps, gain)
-        outcomes.append(fb.rollout(sim, pilot, 3.0, (), PERIOD, motors).outcome)
-    assert outcomes == ["completed", "fell"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("floatbase.lessons.lessonX.cases.MU", 4 * 1.2)
-        assert record_box("grips", twist, InjectedFault("slow motors", 45.0)).fell
+def slow_motors(robot, fault, first):
+    lag = FirstOrderLag(robot, 1e3 / (2.0 * np.pi * 45.0))  # 45 ms
+    lag.reset(first)
+    return lag
+
+
+@pytest.mark.parametrize(("delay", "gain", "falls"), [(0, 5 / 6, False), (20, 1.0, True)])
+def test_the_delay_of_slow_motors_fells_the_robot_not_the_smaller_command(
+    monkeypatch, delay, gain, falls
+):
+    def motors(robot, fault, first):
+        return ChangedTorques(first, delay, gain)
+
+    monkeypatch.setattr("floatbase.lessons.lessonX.cases.faulty_motors", motors)
+    assert crash_test("slow motors", 45.0).fell == falls
+
+
+def test_slow_motors_fell_the_robot_on_a_floor_with_four_times_the_friction(monkeypatch):
+    monkeypatch.setattr("floatbase.lessons.lessonX.cases.faulty_motors", slow_motors)
+    assert crash_test("friction", 4 * 1.2).fell
 
 
 def test_a_forgotten_drift_does_no_harm_to_a_slow_twist():
-    assert record_box("fast", Twist(), InjectedFault("drift")).fell
-    assert not record_box("slow", Twist(rate=1.2), InjectedFault("drift")).fell
+    twist = type(random_cases(1)[0].twists[0])
+    assert record_box("fast", twist(), InjectedFault("drift")).fell
+    assert not record_box("slow", twist(rate=1.2), InjectedFault("drift")).fell
 
 
 def test_stronger_motors_do_not_keep_a_joint_within_its_limit_when_the_target_is_out_of_reach():
