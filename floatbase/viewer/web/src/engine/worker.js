@@ -3,8 +3,8 @@
 //
 // From the page: {start}, {begin}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset},
 // {pause}, {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame},
-// {stoodUp}, {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
-// with `isRefusal` says why a message makes no sense; then nothing has changed.
+// {stoodUp}, {settings}, {recovery}, {error}. {settings} are those that the page did not set
+// itself. An error with `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
