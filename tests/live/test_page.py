@@ -61,7 +61,9 @@ def test_a_copied_address_opens_the_same_walk_with_the_same_terms_and_view(page,
 
 
 def test_reset_everything_restores_the_first_settings_and_undo_takes_it_back(page, address):
-    first, walking = settings_at(page, address), settings_at(page, address + WALK)
+    first = settings_at(page, address + "?gait=walk&mu=0.5")
+    walking = settings_at(page, address + "?gait=walk&mu=0.5" + WALK)
+    assert (first["gait"], first["mu"], walking["gait"]) == ("walk", 0.5, "trot")
     assert press(page, "reset everything") == first
     kept = page.evaluate("[...new URLSearchParams(location.hash.slice(1)).keys()]")
     assert set(kept) == {"view", "motion"}  # no setting

@@ -102,13 +102,13 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   const mostOf = (name) => robot.gaits[name]?.most ?? [0, 0];
   const joystick = createJoystick(() => mostOf(gait), (motion) => send({set: motion}));
   element("meshcat-pane").append(joystick.box);
-  // Walk with a gait, forwards at first; null: stand.
-  function walk(chosen) {
+  // Walk with a gait, forwards at first; null: stand. message: what the worker gets.
+  function walk(chosen, message = "set") {
     const [x, y] = gait === null ? [0, 0.5] : joystick.at(), [fastest, sharpest] = mostOf(chosen);
     const motion = chosen === null ? {} : {speed: y * fastest, turn: -x * sharpest};
     const changes = {gait: chosen, lifted: null, ...motion};
     showGait({...frame?.settings ?? settings, ...changes});
-    send({set: changes});
+    send({[message]: changes});
   }
   function showGait(now) {
     ({gait} = now);
@@ -166,6 +166,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     const message = (presses.get(key) ?? changes.get(key))?.(value);
     if (message) send(message);
   });
+  if (firstGait) walk(firstGait, "begin");
   if (hasPanel) {
     for (const name of presses.keys()) scene.handle({type: "set_control", path: "", name});
     for (const {command} of controls) scene.handle(command);
@@ -278,7 +279,6 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     tell({rank: -2, text: content, stays: REFUSAL_TIME}, performance.now());
     parent.postMessage({floatbase: "refused", text: content}, "*");
   }
-  if (firstGait) walk(firstGait);
   // What the address has beside the controls: how the robot walks, and a push after a second. A
   // push is the number of a joint, or -1 for the middle of the base, a point, a force, a duration.
   scene.lookAsAddressed();

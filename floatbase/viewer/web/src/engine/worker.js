@@ -1,10 +1,10 @@
 // The worker of a page with a live robot: it holds the engine, and steps it when the page asks for
 // a picture. A page that draws nothing lets the robot rest.
 //
-// From the page: {start}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset}, {pause},
-// {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame}, {stoodUp},
-// {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
-// with `isRefusal` says why a message makes no sense; then nothing has changed.
+// From the page: {start}, {begin}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset},
+// {pause}, {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame},
+// {stoodUp}, {settings}, {recovery}, {error}. {settings} are those that the page did not set
+// itself. An error with `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
@@ -21,7 +21,8 @@ let mj = null, module = null, robot = null, engine = null, stop = false;
 let resting = []; // joints that are at the end of their range when the robot stands
 let around = null; // names of the contact points, and the weight
 const clock = createClock(STEP), history = createHistory();
-let first = null; // the settings of "reset everything"
+let home = null; // the settings that the page began with
+let first = null; // the settings of "reset everything": those, or those of a challenge
 let challenge = null, judge = null; // what is to be solved, or null, and who watches
 let foot = null; // the contact point whose force the page explains
 let motion = null; // of the centre of mass at the last picture: {time, velocity, acceleration}
@@ -62,7 +63,7 @@ async function start({name, settings}) {
     }
   }
   resting = [...standing];
-  first = {...defaults(robot), ...settings};
+  home = first = {...defaults(robot), ...settings};
   restart(first);
   history.clear();
   clock.reset();
@@ -183,6 +184,11 @@ function picture() {
 const handlers = {
   start: (given) => start(given),
   set: (changes) => engine && change(changes),
+  // The page begins with more settings.
+  begin(settings) {
+    engine.set(settings);
+    home = first = engine.settings;
+  },
   undo() {
     const before = engine && history.undo(engine.settings);
     if (!before) return;
@@ -209,7 +215,7 @@ const handlers = {
   challenge(title) {
     check("challenge", title, choiceRule([null, ...challenges.map((each) => each.title)]));
     challenge = challenges.find((each) => each.title === title) ?? null;
-    first = {...defaults(robot), ...challenge && startOf(challenge)};
+    first = challenge ? {...defaults(robot), ...startOf(challenge)} : home;
     history.clear();
     restart(first);
     postMessage({settings: engine.settings});
