@@ -27,7 +27,7 @@ from floatbase.errors import FloatbaseError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import qp_plots
 from floatbase.lessons.lessonC import table_top
-from floatbase.playground import CHALLENGES, PerturbedSimulation
+from floatbase.playground import CHALLENGES, PerturbedSimulation, Settings
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer.export import recording
 from floatbase.viewer.plots import run_plots
@@ -97,6 +97,7 @@ def right():
     return values() | {
         "Simulation": fb.Simulation(robot), "Viewer": view, "Controller": standing,
         "WholeBodyController": standing,
+        "Settings": Settings(),
         "LiveSimulation": LiveSimulation(fb.Simulation(robot), standing, lambda record: None),
         "PerturbedSimulation": PerturbedSimulation(robot), "Challenge": CHALLENGES[0],
         "Affine": affine, "Quadratic": fb.Quadratic(np.eye(12), np.ones(12)),

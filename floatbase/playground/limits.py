@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 
+from floatbase._validation import as_instance
 from floatbase.dynamics import Contacts
 from floatbase.friction import FrictionPolyhedron
 from floatbase.playground.settings import Settings
@@ -55,7 +56,14 @@ def limit_text(record: Rollout, settings: Settings) -> str:
     -------
     str
         A sentence, such as "The front left foot is at its friction limit."
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type.
     """
+    as_instance("record", record, Rollout)
+    as_instance("settings", settings, Settings)
     robot, contacts = record.robot, record.contacts
     measured, planned = (forces[-1].reshape(-1, 3) for forces in (record.measured, record.planned))
     if (
