@@ -38,6 +38,7 @@ PACKAGES = (
 )  # fmt: skip
 # of the viewer; the others draw and pack what these and `Viewer.show` have checked
 MODULES = (run_plots, qp_plots, recording)
+import_module("meshcat")  # warns when it is first imported
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
 FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
 # what makes sense after all; a problem is checked when its QP is built
