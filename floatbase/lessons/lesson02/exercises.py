@@ -43,7 +43,7 @@ def _row_mistakes() -> list[Mistake]:
          "supplies. On which side of (4) is Jᵀ λ?"),
         ("at_rest", bias - contact, "Without M q̈, this is a robot that does not accelerate."),
         *(("other_rows", state.M @ (record.v[j] - record.v[i - 1]) / dt + bias - contact,
-         "The forces of row 300 act from row 300 to row 301. Which two velocities belong to them?")
+         "The forces at 300 ms act until 301 ms. Which two velocities belong to them?")
           for j, dt in ((i, 1e-3), (i + 1, 2e-3))),
         ("no_h", inertial - contact, "The third row is minus the weight. Which term of (4) "
          "contains gravity?"),
@@ -91,8 +91,8 @@ def _judge_fault(answer: Any) -> Verdict:
     return first_fault([
         ("no_line", line not in (1, 2, 3, 4), "The first number is the number of the wrong line, "
          "from 1 to 4."),
-        ("line_2", line == 2, "Line 2 is the angular acceleration of the base and those of the "
-         "joints. Would a fault there leave the moment rows almost zero?"),
+        ("line_2", line == 2, "Line 2 contains the angular acceleration of the base and the "
+         "accelerations of the joints. Would a fault there leave the moment rows almost zero?"),
         ("line_3", line == 3, "A wrong state would give a wrong J, so the contact forces would "
          "have wrong moments. The moment rows are almost zero."),
         ("line_4", line == 4, "A wrong sign or place of the forces would show in the vertical row "

@@ -177,8 +177,8 @@ EXERCISES = (
         judge=BugHunt(
             lines=("2", "3"),
             kind="frame",
-            praise="The residual subtracts world axes from base axes. They agree only as long as "
-            "the robot faces forwards.",
+            praise="The residual subtracts a vector in world axes from a vector in base axes. "
+            "The axes agree only as long as the robot faces forwards.",
             refuted={
                 "sign": "With a wrong sign, go2 would accelerate the other way at every heading. "
                 "At 0° the result is right.",

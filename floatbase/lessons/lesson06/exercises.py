@@ -81,7 +81,7 @@ def _facet_mistakes() -> list[Mistake]:
         ("horizontal", _with_tangents(BANK_MU * np.cos(np.pi / 5), level=True), "The directions d "
          "are horizontal. On a bank they must lie along the surface, as `tangents` gives them."),
         ("whole_angle", _with_tangents(BANK_MU * np.cos(2 * np.pi / 5)), "This uses cos(2π/N). "
-         "From the middle of a facet to its edge it is half of that angle, π/N."),
+         "From the middle of a facet to its edge, the angle is half as large, π/N."),
         ("level", _rows_from_edges(normal=[0.0, 0.0, 1.0]), "These are the constraints on level "
          "ground. Use the given normal."),
     ]  # fmt: skip

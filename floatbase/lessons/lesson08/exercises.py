@@ -63,8 +63,8 @@ def foothold_mistakes() -> list[Mistake]:
         ("home", home, "There is no answer yet: this is the foot's place while go2 stands."),
         ("no_body", _footholds((0, 1, 1)), "That is measured from the body. Add where the centre "
          "of mass is at touch-down."),
-        ("no_step", _footholds((1, 0, 1)), "Your formula `step` is missing. So no error of the "
-         "velocity moves the foot."),
+        ("no_step", _footholds((1, 0, 1)), "Your formula `step` is missing. Without it, an "
+         "error of the velocity does not move the foot."),
         ("no_offset", _footholds((1, 1, 0)), "Both feet land at the same point. Add the foot's "
          "usual place, seen from the middle of the feet."),
         ("now", right - by, "That starts from where the centre of mass is now. The foot lands "
@@ -78,7 +78,7 @@ def foothold_mistakes() -> list[Mistake]:
 
 _FOOTHOLD = NumericJudge(
     right=_footholds,
-    praise="Where the body will be, where the pendulum needs its support, and the foot's own side.",
+    praise="The parts: the body's future place, the pendulum's support, and the foot's own side.",
     mistakes=foothold_mistakes,
 )
 
