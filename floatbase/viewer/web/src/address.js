@@ -91,6 +91,8 @@ export function createAddress(controls, say) {
       if (refused.has(name)) say([...refused.values()].join(" "));
     },
     changed() { timer ??= setTimeout(write, DELAY); },
+    // The part after # without view and push, which are for one robot.
+    settings: () => writeHash(moved()),
     // `count` numbers of a key that is no control, or undefined.
     numbers(key, count) {
       const text = readHash(location.hash).get(key);
