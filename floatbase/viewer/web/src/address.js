@@ -108,7 +108,7 @@ export function createAddress(controls, say) {
     // An address that opens the same. extras: {key: numbers}, undefined for none.
     link(extras) {
       const texts = Object.entries(extras).filter(([, numbers]) => numbers)
-        .map(([key, numbers]) => [key, numbers.map((x) => Number(x.toPrecision(4))).join()]);
+        .map(([key, numbers]) => [key, numbers.map((x) => Number(x.toFixed(4))).join()]);
       return location.origin + addressWith(texts);
     },
   };
