@@ -70,3 +70,15 @@ def test_reset_everything_restores_the_first_settings_and_undo_takes_it_back(pag
     page.wait_for_function(f"{kept} == 'view,motion'")  # no setting
     press(page, "undo", walking)
     assert page.locator(".joystick").is_visible()
+
+
+def test_a_paused_robot_keeps_its_time_and_the_sentence_about_its_limits(page, address):
+    settings_at(page, address + "#CoM+x+[cm]=8&torque+limits+[%25]=18")
+    limit = "document.getElementById('title').textContent.includes('torque limit')"
+    page.wait_for_function(limit)
+    page.evaluate("viewer.gui_controllers.pause.fire()")
+    page.wait_for_function("document.getElementById('panel').textContent.includes('Paused at')")
+    for _ in range(30):  # pictures without a step, as while the reader drags the robot
+        page.evaluate("floatbaseLive.send({foot: null})")
+        page.wait_for_timeout(50)
+    assert page.evaluate(limit)
