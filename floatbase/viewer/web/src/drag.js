@@ -33,7 +33,7 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     return robot ? rayTo(event).intersectObject(robot, true)[0] : undefined;
   }
   function begin(event) {
-    if (begun !== null) return; // a second finger
+    if (begun !== null) return event.stopPropagation(); // a second finger does nothing
     const found = event.button === 0 && isWanted() ? hit(event) : undefined;
     if (!found) return;
     event.stopPropagation(); // the view does not turn
