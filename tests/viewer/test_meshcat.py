@@ -133,15 +133,8 @@ def test_a_server_that_waits_for_a_browser_is_no_failure_and_one_that_has_ended_
     view.show(moved(standing, 2.0))
     vis.window.server_proc.kill()
     steps = count(3.0)
-
-    def fails():
-        try:
-            view.show(moved(standing, next(steps)))
-        except ViewerError as error:
-            return vis.window.zmq_url in str(error)
-        return False
-
-    until(fails)
+    with raises(ViewerError, vis.window.zmq_url):
+        until(lambda: not view.show(moved(standing, next(steps))))
 
 
 def test_what_is_no_visualizer_is_refused(go2):
