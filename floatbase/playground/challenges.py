@@ -31,6 +31,8 @@ from floatbase.playground.session import Session
 from floatbase.playground.settings import PAIR_NAMES, SETTING_NAMES, Settings
 
 _LIMITS: dict[str, float] = CHALLENGE_TABLE["limits"]
+# settings whose controls have other names
+_WORDS: dict[str, str] = CHALLENGE_TABLE["words"]
 _MIN_LOAD = _LIMITS["min_load"]  # N: a foot with a larger normal force counts as loaded
 _LIFTED_HEIGHT = _LIMITS["lifted_height"]  # m above the ground: a higher foot counts as lifted
 _SLIDE_DISTANCE = 0.3  # m, twice as far as the robot slides with the initial settings
@@ -204,10 +206,12 @@ class Challenge(Value):
         """
         as_instance("settings", settings, Settings)
         locked = [
-            name for name in self.locked if getattr(settings, name) != getattr(self.start, name)
+            _WORDS.get(name, name.replace("_", " "))
+            for name in self.locked
+            if getattr(settings, name) != getattr(self.start, name)
         ]
         return locked + [
-            f"actual {name}"
+            f"{name} in reality"
             for name in self.locked_actual
             if getattr(settings, name)[1] != getattr(self.start, name)[1]
         ]

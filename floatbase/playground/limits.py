@@ -14,6 +14,7 @@ from floatbase.simulation import Rollout
 
 _SLIPPING, _BEYOND = 0.97, 1.02  # fractions of the actual friction limit
 _UNLOADED = 0.01  # fraction of the weight: a point with less does not stand
+_LOAD_TOLERANCE = 0.01  # N: a planned force this close to the smallest one is at it
 _TORQUE_TOLERANCE = 1e-4  # fraction of a torque limit
 _FACET_TOLERANCE = 1e-4  # fraction of the normal force
 _MOST_NAMES = 2  # in a sentence
@@ -125,7 +126,7 @@ def _friction_limits(record: Rollout, settings: Settings) -> tuple[list[str], li
             if not np.isfinite(load):
                 continue
             cone = FrictionPolyhedron(contacts.normals[i], contacts.mus[i], settings.facets)
-            if load <= settings.min_normal_force + _UNLOADED:
+            if load <= settings.min_normal_force + _LOAD_TOLERANCE:
                 unloaded[foot_name(name)] = True
             elif np.max(cone.face_matrix @ force) > -_FACET_TOLERANCE * load:
                 gripping[foot_name(name)] = True

@@ -2,6 +2,7 @@
 
 import pytest
 from browsers import browser_of_a_file, needs_chromium, served
+from waiting import until
 
 from floatbase.live import folder
 
@@ -40,10 +41,10 @@ def settings_at(page, address):
     return page.evaluate(SETTINGS)
 
 
-def press(page, name):
+def press(page, name, settings):
+    """Press a button, and wait until the engine has the settings."""
     page.evaluate("name => viewer.gui_controllers[name].fire()", name)
-    page.wait_for_timeout(1000)
-    return page.evaluate(SETTINGS)
+    until(lambda: page.evaluate(SETTINGS) == settings, lambda: page.wait_for_timeout(20))
 
 
 def test_a_copied_address_opens_the_same_walk_with_the_same_terms_and_view(page, address):
@@ -64,8 +65,34 @@ def test_reset_everything_restores_the_first_settings_and_undo_takes_it_back(pag
     first = settings_at(page, address + "?gait=walk&mu=0.5")
     walking = settings_at(page, address + "?gait=walk&mu=0.5" + WALK)
     assert (first["gait"], first["mu"], walking["gait"]) == ("walk", 0.5, "trot")
-    assert press(page, "reset everything") == first
-    kept = page.evaluate("[...new URLSearchParams(location.hash.slice(1)).keys()]")
-    assert set(kept) == {"view", "motion"}  # no setting
-    assert press(page, "undo") == walking
+    press(page, "reset everything", first)
+    kept = "[...new URLSearchParams(location.hash.slice(1)).keys()].join()"
+    page.wait_for_function(f"{kept} == 'view,motion'")  # no setting
+    press(page, "undo", walking)
     assert page.locator(".joystick").is_visible()
+
+
+def test_a_paused_robot_keeps_its_time_and_the_sentence_about_its_limits(page, address):
+    settings_at(page, address + "#CoM+x+[cm]=8&torque+limits+[%25]=18")
+    limit = "document.getElementById('title').textContent.includes('torque limit')"
+    page.wait_for_function(limit)
+    page.evaluate("viewer.gui_controllers.pause.fire()")
+    page.wait_for_function("document.getElementById('panel').textContent.includes('Paused at')")
+    for _ in range(30):  # pictures without a step, as while the reader drags the robot
+        page.evaluate("floatbaseLive.send({foot: null})")
+        page.wait_for_timeout(50)
+    assert page.evaluate(limit)
+
+
+TOUCH = """([type, pointerId, way]) => document.querySelector("canvas").dispatchEvent(
+  new PointerEvent(type, {pointerId, clientX: 400 + way, clientY: 250, bubbles: true}))"""
+
+
+def test_a_second_finger_neither_releases_the_robot_nor_leaves_a_line(page, address):
+    settings_at(page, address + "?panel=0")
+    lines = "viewer.scene.children.filter(({isLine}) => isLine).length"
+    for event, finger, way in (("down", 1, 0), ("move", 1, 60), ("down", 2, 1), ("up", 2, 1)):
+        page.evaluate(TOUCH, [f"pointer{event}", finger, way])
+    assert page.evaluate(lines) == 1 and page.locator(".newtons").inner_text()
+    page.evaluate(TOUCH, ["pointerup", 1, 60])
+    assert page.evaluate(lines) == 0

@@ -127,21 +127,14 @@ def test_a_run_plays_at_its_speed_until_the_next_picture(view, vis, go2, standin
 def test_a_server_that_waits_for_a_browser_is_no_failure_and_one_that_has_ended_is(
     view, vis, standing
 ):
-    view.show(standing)
-    vis.window.zmq_socket.send(b"wait")  # as `vis.wait()` does, which returns when a page opens
     view.show(moved(standing, 1.0))
+    until(lambda: base_x(vis) == 1.0)  # it is connected
+    vis.window.zmq_socket.send(b"wait")  # as `vis.wait()` does, which returns when a page opens
+    view.show(moved(standing, 2.0))
     vis.window.server_proc.kill()
-
-    steps = count(2.0)
-
-    def fails():
-        try:
-            view.show(moved(standing, next(steps)))
-        except ViewerError as error:
-            return vis.window.zmq_url in str(error)
-        return False
-
-    until(fails)
+    steps = count(3.0)
+    with raises(ViewerError, vis.window.zmq_url):
+        until(lambda: not view.show(moved(standing, next(steps))))
 
 
 def test_what_is_no_visualizer_is_refused(go2):

@@ -285,7 +285,8 @@ def test_the_camera_goes_with_the_robot(page, viewer, go2, standing):
     after = page.evaluate(TARGET)
     assert after[0] - before[0] == pytest.approx(1.5, abs=STEP) and after[1] == before[1]
 
-    viewer.show(standing, title="still").camera(follow=True)
+    viewer.show(standing).camera(follow=True)
+    viewer.show(standing, title="still")  # the page has the camera when it has the title
     settle(page, "still")
     before = page.evaluate(TARGET)
     viewer.draw({})

@@ -22,9 +22,8 @@ export async function compare(given) {
     robots[name] = files[`${name}.json`];
     engines[name] = createEngine(mj, module, robots[name]);
   }
-  const recovery = await compareRecovery();
-  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(), recovery,
-    refusals: compareRefusals(), challenges: compareChallenges()};
+  return {states: compareStates(), runs: compareRuns(), walks: compareWalks(),
+    recovery: compareRecovery(), refusals: compareRefusals(), challenges: compareChallenges()};
 }
 
 const largest = (a, b) => a.reduce((most, x, i) => Math.max(most, Math.abs(x - b[i])), 0);
@@ -191,9 +190,9 @@ function walkAlone(walk, rows) {
   return {outcome: outcomeOf(engine), distance, moved};
 }
 
-async function compareRecovery() {
+function compareRecovery() {
   const given = files["recovery.json"], robot = robots[given.robot], pushes = [];
-  for await (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
+  for (const {push} of pushRecovery({...given, mj, module, robot, settings: {}})) {
     pushes.push(push);
   }
   return {pushes, python: given.pushes, resolution: given.resolution};

@@ -91,6 +91,8 @@ export function createAddress(controls, say) {
       if (refused.has(name)) say([...refused.values()].join(" "));
     },
     changed() { timer ??= setTimeout(write, DELAY); },
+    // The part after # without view and push, which are for one robot.
+    settings: () => writeHash(moved()),
     // `count` numbers of a key that is no control, or undefined.
     numbers(key, count) {
       const text = readHash(location.hash).get(key);
@@ -106,7 +108,7 @@ export function createAddress(controls, say) {
     // An address that opens the same. extras: {key: numbers}, undefined for none.
     link(extras) {
       const texts = Object.entries(extras).filter(([, numbers]) => numbers)
-        .map(([key, numbers]) => [key, numbers.map((x) => Number(x.toPrecision(4))).join()]);
+        .map(([key, numbers]) => [key, numbers.map((x) => Number(x.toFixed(4))).join()]);
       return location.origin + addressWith(texts);
     },
   };

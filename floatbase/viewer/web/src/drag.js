@@ -33,6 +33,7 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     return robot ? rayTo(event).intersectObject(robot, true)[0] : undefined;
   }
   function begin(event) {
+    if (begun !== null) return event.stopPropagation(); // a second finger does nothing
     const found = event.button === 0 && isWanted() ? hit(event) : undefined;
     if (!found) return;
     event.stopPropagation(); // the view does not turn
@@ -69,18 +70,20 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     begun.line.geometry.setFromPoints(ends);
     viewer.set_dirty();
   }
-  function finish(push) {
-    if (begun === null) return;
-    viewer.scene.remove(begun.line);
+  function finish({pointerId, type}) {
+    if (begun?.pointer !== pointerId) return;
+    const {line, push} = begun;
+    viewer.scene.remove(line);
+    line.geometry.dispose();
+    line.material.dispose();
     viewer.set_dirty();
     begun = null;
     newtons.textContent = "";
-    release(push);
+    release(type === "pointerup" ? push : null);
   }
   element("meshcat-pane").addEventListener("pointerdown", begin, {capture: true});
   addEventListener("pointermove", move, {capture: true});
-  addEventListener("pointerup", () => finish(begun && begun.push), {capture: true});
-  addEventListener("pointercancel", () => finish(null), {capture: true});
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, finish, {capture: true});
   canvas.addEventListener("touchstart", (event) => { // a finger on the robot scrolls no page
     if (begun !== null) event.preventDefault();
   }, {passive: false});

@@ -32,6 +32,7 @@ const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playgrou
   "`floatbase view talos`.";
 const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
 const PUSHED_AFTER = 1; // s: when the push in an address acts
+const SETTLED = 1000; // ms after a change in which the texts of a paused robot become up to date
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -63,6 +64,7 @@ async function start(scene, worker, {config, given, name, sight}) {
   });
   try {
     const response = await fetch(`${name}.scene`);
+    if (!response.ok) throw new Error(`The robot's picture cannot be loaded (${response.status}).`);
     scene.apply(await unpack(new Uint8Array(await response.arrayBuffer())));
     scene.fit();
     live(scene, worker, send, await ready, {config, given, name, sight});
@@ -73,13 +75,14 @@ async function start(scene, worker, {config, given, name, sight}) {
 }
 
 function live(scene, worker, post, {drawing, settings, robot}, {config, given, name, sight}) {
-  let isStale = true; // whether the robot may differ from its picture while it is paused
+  let changed = 0; // ms, when the robot or its picture was changed by the reader
   let pushed = null; // the last push, as the worker gets it
   const send = (message) => {
-    isStale = true;
+    changed = performance.now();
     if (message.push) {
       hasPushed();
       pushed = message.push;
+      parent.postMessage({floatbase: "push", force: pushed.force}, "*");
     }
     post(message);
   };
@@ -134,7 +137,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     names: config.robots, name, walk, shove, draw: painter.show, watch: footView.watch,
     open(other) {
       given.texts.set("name", other);
-      location.search = given.texts;
+      location.assign(`?${given.texts}${scene.address.settings()}`);
     },
   });
   const changes = new Map(controls.map(({command, change}) => [command.name, change]));
@@ -196,14 +199,13 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     most: () => 2.5 * robot.weight,
     show(now) {
       dragged = grabbed(now);
-      isStale = true;
+      changed = performance.now();
     },
     release(now) {
       dragged = null;
       if (now === null) return;
-      const {body, at, force: pushed} = grabbed(now);
-      send({push: {body, at, force: pushed, duration: push.duration}});
-      parent.postMessage({floatbase: "push", force: pushed}, "*");
+      const {body, at, force: newtons} = grabbed(now);
+      send({push: {body, at, force: newtons, duration: push.duration}});
     },
   });
   const joints = drawing.links.map(([joint, item]) => [joint, ["meshcat", ...item.split("/")]]);
@@ -308,8 +310,9 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page
   (function loop() {
     requestAnimationFrame(loop);
-    if (isWaiting || !sight() || (isPaused && !isStale)) return;
-    [isWaiting, isStale] = [true, false];
+    const hasSettled = isPaused && performance.now() > changed + SETTLED;
+    if (isWaiting || !sight() || hasSettled) return;
+    isWaiting = true;
     post({frame: true});
   })();
 }

@@ -34,7 +34,12 @@ export function createShare(viewer, address) {
     const button = make("button", {type: "button", textContent: text});
     button.onclick = async () => {
       button.disabled = true;
-      button.textContent = await act((doing) => { button.textContent = doing; });
+      try {
+        button.textContent = await act((doing) => { button.textContent = doing; });
+      } catch (error) {
+        console.error("floatbase: nothing was saved", error);
+        button.textContent = "not possible in this browser";
+      }
       setTimeout(() => { Object.assign(button, {textContent: text, disabled: false}); }, SHOWN);
     };
     menu.append(button);
@@ -53,12 +58,16 @@ export function createShare(viewer, address) {
     });
   }
   if (address === null) return;
+  const field = make("input", {readOnly: true, hidden: true});
+  field.setAttribute("aria-label", "address");
   add("copy address", async () => {
     try {
       await navigator.clipboard.writeText(address());
-    } catch { // a page in a frame may not write to the clipboard
-      prompt("Copy this address:", address());
+      return "copied";
+    } catch { // a page in a frame, or without https, may not write to the clipboard
+      Object.assign(field, {hidden: false, value: address()}).select();
+      return "press Ctrl+C";
     }
-    return "copied";
   });
+  menu.append(field);
 }

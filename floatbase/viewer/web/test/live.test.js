@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import test from "node:test";
+import {challenges, createJudge} from "../src/engine/challenges.js";
 import {createClock} from "../src/engine/clock.js";
 import {slippingPoints} from "../src/engine/contacts.js";
 import {createHistory} from "../src/engine/history.js";
@@ -232,6 +233,20 @@ const go2 = {
   walking: {gaits: {trot: {most: [0.6, 0.8]}, walk: {most: [0.2, 0.15]}}}, mu: 0.7, gravity: 9.81,
   legs: {FL_foot: ["FL_foot"], FR_foot: ["FR_foot"]},
 };
+
+test("a judge names what must not be changed in the words of the controls", () => {
+  const start = defaults(go2), pushes = [];
+  const changed = {...start, payload: 1, torque: 0.5, assumedOff: ["gravity"], actualMu: 0.2};
+  const said = challenges.map((challenge) => {
+    const judge = createJudge(challenge, start);
+    judge.observe({time: 0, span: 1, feet: [], facets: [], pushes}, changed);
+    return judge.status.message;
+  });
+  const most = said.find((text) => /torque/.test(text));
+  assert.match(most, /payload.* terms of the model.*torque limits/);
+  assert.ok(said.some((text) => /friction in reality/.test(text)));
+  for (const text of said) assert.doesNotMatch(text, /_|Off/);
+});
 
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);

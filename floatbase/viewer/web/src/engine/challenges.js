@@ -3,7 +3,7 @@
 
 import table from "../../../../live/challenges.json" with {type: "json"};
 
-const {limits} = table;
+const {limits, words} = table;
 export const challenges = table.challenges.filter(({live}) => live);
 // settings of the playground -> those of the page, assumed and actual value of a pair
 const PAGE_SETTINGS = {
@@ -106,9 +106,10 @@ export function createJudge({judge, text, locked, locked_actual: actual = []}, s
   function violations(settings) {
     const keys = (name) => PAGE_SETTINGS[name] ?? [], changed = isChanged(settings);
     return [
-      ...locked.filter((name) => keys(name).some(changed)),
-      ...actual.filter((name) => changed(keys(name).at(-1))).map((name) => `actual ${name}`),
-    ].map((name) => name.replaceAll("_", " "));
+      ...locked.filter((name) => keys(name).some(changed))
+        .map((name) => words[name] ?? name.replaceAll("_", " ")),
+      ...actual.filter((name) => changed(keys(name).at(-1))).map((name) => `${name} in reality`),
+    ];
   }
   function apply(verdict, settings) {
     if (isWon) return;

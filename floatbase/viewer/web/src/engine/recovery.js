@@ -10,7 +10,7 @@ const MOST = 100; // times the weight: a larger push shows that it does not act
 
 // mj, module, robot: as for `createEngine`. settings: those of the page. directions: angles, rad.
 // Yields {direction, push} for each of them, rad and N.
-export async function* pushRecovery({mj, module, robot, settings, directions, duration,
+export function* pushRecovery({mj, module, robot, settings, directions, duration,
   resolution}) {
   const engine = createEngine(mj, module, robot), weight = robot.weight / resolution;
   let first = Math.ceil(weight), step = first;
@@ -22,7 +22,6 @@ export async function* pushRecovery({mj, module, robot, settings, directions, du
       const found = largest(isSurvived, first, step, MOST * weight);
       yield {direction, push: resolution * found};
       [first, step] = [Math.max(1, found), 1];
-      await new Promise((go) => { setTimeout(go); }); // messages, such as one to stop
     }
   } finally {
     engine.free();

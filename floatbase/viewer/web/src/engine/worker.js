@@ -2,9 +2,9 @@
 // a picture. A page that draws nothing lets the robot rest.
 //
 // From the page: {start}, {begin}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset},
-// {pause}, {step}, {timeScale}, {frame}, {recovery}, {stop}; to the page: {ready}, {frame},
-// {stoodUp}, {settings}, {recovery}, {error}. {settings} are those that the page did not set
-// itself. An error with `isRefusal` says why a message makes no sense; then nothing has changed.
+// {pause}, {step}, {timeScale}, {frame}, {recovery}; to the page: {ready}, {frame}, {stoodUp},
+// {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
+// with `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
@@ -17,7 +17,7 @@ import {
 } from "./settings.js";
 
 const WARM_UP = 800; // steps, after which a browser has optimised the code
-let mj = null, module = null, robot = null, engine = null, stop = false;
+let mj = null, module = null, robot = null, engine = null;
 let resting = []; // joints that are at the end of their range when the robot stands
 let around = null; // names of the contact points, and the weight
 const clock = createClock(STEP), history = createHistory();
@@ -26,7 +26,8 @@ let first = null; // the settings of "reset everything": those, or those of a ch
 let challenge = null, judge = null; // what is to be solved, or null, and who watches
 let foot = null; // the contact point whose force the page explains
 let motion = null; // of the centre of mass at the last picture: {time, velocity, acceleration}
-// constraints that were active, and contact points that slipped, since the last picture
+// constraints that were active, and contact points that slipped, in the steps of the last picture
+// that had some
 const seen = new Map(), slipping = new Set();
 let slipTime = null; // s, when a point slipped for the last time before the controller stopped
 const RECENT = 1; // s before a fall, in which a slip counts as its cause
@@ -81,6 +82,8 @@ const summary = () => ({
 function restart(settings = {}) {
   engine.set(settings);
   engine.reset();
+  seen.clear();
+  slipping.clear();
   slipTime = null;
   judge = challenge && createJudge(challenge, first);
 }
@@ -95,8 +98,10 @@ function frame() {
   const count = clock.steps(performance.now(), isPushed);
   const begin = performance.now();
   let done = 0;
-  seen.clear();
-  slipping.clear();
+  if (count > 0) { // else the robot is paused, or very slow
+    seen.clear();
+    slipping.clear();
+  }
   for (; done < count; done++) {
     if (engine.isAtRest) {
       const before = judge;
@@ -231,13 +236,10 @@ const handlers = {
     clock.setScale(scale);
   },
   frame: () => { if (engine) frame(); },
-  stop: () => { stop = true; },
   async recovery(given) {
-    stop = false;
     if (mj === null) await load();
     const data = await (await fetchOk(`${given.name}.json`)).json();
-    for await (const found of pushRecovery({mj, module, robot: data, ...given})) {
-      if (stop) return;
+    for (const found of pushRecovery({mj, module, robot: data, ...given})) {
       postMessage({recovery: found});
     }
   },

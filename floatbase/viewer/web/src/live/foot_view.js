@@ -55,6 +55,7 @@ export function createFootView(viewer, robot, drawing, choose) {
   picture.setAttribute("role", "img");
   const title = make("b"), text = make("p"), scale = make("small");
   const close = make("button", {type: "button", textContent: "×", title: "close"});
+  close.setAttribute("aria-label", "close");
   const box = make("div", {className: "foot", hidden: true}, title, close, picture, scale, text);
   document.body.append(box);
   close.onclick = () => watch(null);

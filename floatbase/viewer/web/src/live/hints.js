@@ -20,19 +20,19 @@ export const triesOf = (robot) => [
   "Set “gravity” to 1.6 m/s², as on the Moon, and push again.",
 ];
 
-// tries: lines after the first push; none: the line goes. Returns a function that a push calls.
+// tries: lines after the first push, each once; then the line goes. Returns a function that a push
+// calls.
 export function createHint(tries) {
   const line = element("hint");
   let next = 0, hasPushed = false;
   function show() {
-    line.textContent = tries[next++ % tries.length];
-    setTimeout(show, PERIOD);
+    line.textContent = tries[next++] ?? "";
+    if (next <= tries.length) setTimeout(show, PERIOD);
   }
   line.textContent = FIRST;
   return () => {
     if (hasPushed) return;
     hasPushed = true;
-    if (tries.length) show();
-    else line.textContent = "";
+    show();
   };
 }

@@ -135,6 +135,10 @@ export function createRecoveryMap(viewer, {size, name, say}) {
     for (const worker of workers) worker.terminate();
     workers = [];
   }
+  function fail(reason) {
+    end();
+    say(`The push-recovery map stopped: ${reason}. Press the button to start it again.`);
+  }
   // settings: those of the page. what: what is special about them. centre: below the robot, [x, y].
   return function start(settings, what, centre) {
     end();
@@ -147,8 +151,9 @@ export function createRecoveryMap(viewer, {size, name, say}) {
     draw();
     workers = deal(DIRECTIONS, count).map((directions) => {
       const worker = new Worker("engine.js", {type: "module"});
+      worker.onerror = () => fail("its program cannot be loaded");
       worker.onmessage = ({data}) => {
-        if (data.error) return say(data.error);
+        if (data.error) return fail(data.error);
         mine.found.push(data.recovery);
         draw();
         say(mapText(mine.found, what, (performance.now() - begun) / 1000));
