@@ -58,7 +58,7 @@ function conflictText(conflict) {
     const owners = conflict.filter((one) => kindOf(one) === kind).map(ownerOf);
     return `${kind} of the ${list(owners)}`;
   });
-  return `Too much: these constraints cannot hold together: ${kinds.join("; ")}. ` +
+  return `These constraints cannot hold together: ${kinds.join("; ")}. ` +
     "The robot will be back on its feet in a moment.";
 }
 
