@@ -70,7 +70,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# heavy packages, imported on first use: mujoco for Simulation, meshcat for Viewer
+# imported on first use, because mujoco and the viewer take long to import
 _SIMULATION = "Ground", "Push", "Rollout", "Simulation", "push_recovery", "rollout", "sweep"
 _LAZY = dict.fromkeys(_SIMULATION, "floatbase.simulation") | {"Viewer": "floatbase.viewer"}
 

@@ -18,12 +18,14 @@ _LOAD_TOLERANCE = 0.01  # N: a planned force this close to the smallest one is a
 _TORQUE_TOLERANCE = 1e-4  # fraction of a torque limit
 _FACET_TOLERANCE = 1e-4  # fraction of the normal force
 _MOST_NAMES = 2  # in a sentence
+_PLACES = {"F": "front", "R": "rear", "H": "rear"}  # of a leg, by the letters in its names
+_SIDES = {"L": "left", "R": "right"}
 
 
 def foot_name(contact: str) -> str:
     """Return the name of a contact's foot for a reader, such as "front left foot"."""
     if found := re.match(r"([FRH])([LR])_", contact, re.IGNORECASE):
-        return f"{_end(found[1])} {_side(found[2])} foot"
+        return f"{_PLACES[found[1].upper()]} {_SIDES[found[2].upper()]} foot"
     human = re.search("left|right", contact)
     return f"{human[0]} foot" if human else contact
 
@@ -31,16 +33,8 @@ def foot_name(contact: str) -> str:
 def joint_name(joint: str) -> str:
     """Return the name of a joint for a reader, such as "front left calf joint"."""
     if found := re.fullmatch(r"([FRH])([LR])_(.+?)(?:_joint)?", joint):
-        return f"{_end(found[1])} {_side(found[2])} {found[3].lower()} joint"
+        return f"{_PLACES[found[1]]} {_SIDES[found[2]]} {found[3].lower()} joint"
     return joint.replace("_", " ")
-
-
-def _end(letter: str) -> str:
-    return "front" if letter.upper() == "F" else "rear"
-
-
-def _side(letter: str) -> str:
-    return "left" if letter.upper() == "L" else "right"
 
 
 def limit_text(record: Rollout, settings: Settings) -> str:
