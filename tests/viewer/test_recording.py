@@ -252,7 +252,7 @@ def test_a_saved_animation_plays_from_disk_without_network(page, viewer, go2, tm
     for address in (saved, frame):
         page.goto(address.as_uri())
         inside = page.frames[-1]
-        inside.wait_for_function("window.viewer && viewer.num_messages_received > 0")
+        inside.wait_for_function(RECORDED)
         expected = rollout.time[-1]
         assert inside.evaluate("viewer.animator.duration") == pytest.approx(expected, abs=1e-3)
         slider = inside.locator("#player input")
@@ -270,6 +270,7 @@ def test_a_saved_animation_plays_from_disk_without_network(page, viewer, go2, tm
     assert inside.evaluate("viewer.animator.mixer.timeScale") == 0.25
 
 
+RECORDED = "window.viewer && viewer.animator.duration > 0"
 TARGET = "viewer.controls.target.toArray()"
 STEP = 0.01  # m: what the eye does not see in a page that follows a robot through metres
 
@@ -279,6 +280,7 @@ def test_the_camera_goes_with_the_robot(page, viewer, go2, standing):
     viewer.play(record(go2, walk=1.0), paused=True)
     page.goto(viewer.url)
     settle(page)
+    page.wait_for_function(RECORDED)
     before = page.evaluate(TARGET)
     page.evaluate("viewer.animator.seek(1.5)")
     page.wait_for_function("!viewer.needs_render")
@@ -322,7 +324,7 @@ def test_a_busy_page_shows_the_second_record_as_it_is(page, viewer, standing, co
         [0, 1, 2], leaning(viewer, standing, contacts, [0.0, 0.6, 0.0]), paused=True
     )
     page.goto(viewer.url)
-    settle(page)
+    page.wait_for_function(RECORDED)
     page.evaluate("viewer.animator.seek(1.0)")
     page.evaluate(WITHHOLD)
     # the page is busy with this one

@@ -60,6 +60,8 @@ class MeshcatMirror(Channel):
         """Disconnect from the server, which keeps the picture."""
         self._page.close()
         self._sending.cancel()
+        # an event for a monitor that is closed blocks ZeroMQ's thread, and all sockets of it
+        self._socket.disable_monitor()
         self._socket.close(linger=0)
 
     def _connect(self) -> None:
@@ -79,8 +81,8 @@ class MeshcatMirror(Channel):
         """Report the end of the server to the program that draws."""
         with monitor:
             await monitor.recv_multipart()
-        self._server.failure = f"The meshcat server at {self._url} does not run any more"
-        self.close_page(self._server.failure)
+            self._server.failure = f"The meshcat server at {self._url} does not run any more"
+            self.close_page(self._server.failure)
 
     async def _send(self, messages: Iterable[list[bytes]]) -> None:
         """Send messages, and wait until the server has answered all."""

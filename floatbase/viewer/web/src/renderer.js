@@ -47,7 +47,8 @@ export function adaptPixels(viewer, isCheap) {
     clearTimeout(timer);
     if (isCheap) {
       draw(CHEAP);
-      timer = setTimeout(draw, STILL, 1);
+      // a change comes with a picture of its own, before which the camera moves
+      timer = setTimeout(() => viewer.needs_render || draw(1), STILL);
       return;
     }
     const begun = performance.now();
@@ -58,7 +59,9 @@ export function adaptPixels(viewer, isCheap) {
     isCheap = times.length === TRIED && Math.min(...times) > SLOW;
   };
   viewer.capture_image = () => {
+    const isChanged = viewer.needs_render;
     draw(MOST_PIXELS);
+    viewer.needs_render = isChanged;
     return renderer.domElement.toDataURL();
   };
 }

@@ -11,7 +11,7 @@ test("renderers that draw without a graphics card are recognised by their names"
 });
 
 // A viewer whose pictures take `time` ms: the ratio of each picture, the last one after a rest.
-async function ratios(time, isCheap, count = 7) {
+async function ratios(time, isCheap, count = 7, isChanged = false) {
   Object.assign(globalThis, {window: {}, devicePixelRatio: 3});
   const now = performance.now.bind(performance), drawn = [];
   let late = 0, ratio = 1;
@@ -22,6 +22,7 @@ async function ratios(time, isCheap, count = 7) {
   const viewer = {renderer, render: () => drawn.push(ratio)};
   adaptPixels(viewer, isCheap);
   for (let i = 0; i < count; i++) viewer.render();
+  viewer.needs_render = isChanged;
   await new Promise((done) => setTimeout(done, 450));
   performance.now = now;
   return drawn;
@@ -34,4 +35,8 @@ test("a fast machine draws two pixels per pixel at most", async () => {
 test("a slow machine draws few pixels while the picture moves, and all once it rests", async () => {
   assert.deepEqual((await ratios(150, false)).slice(5), [0.5, 0.5, 1]);
   assert.deepEqual(await ratios(150, true, 2), [0.5, 0.5, 1]);
+});
+
+test("a picture at rest does not take the place of one that must follow a change", async () => {
+  assert.deepEqual(await ratios(5, true, 2, true), [0.5, 0.5]);
 });
