@@ -27,7 +27,7 @@ def robot_element(attributes: dict[str, str], instead: str = "") -> str:
     """Return the element of a live robot."""
     written = " ".join(f'{name}="{html.escape(value)}"' for name, value in attributes.items())
     style = f"display: block; margin: 1rem 0; {'min-' if instead else ''}height: {_HEIGHT}"
-    words = "A live robot appears here in a browser with WebAssembly, if the page is on a server."
+    words = "A live robot is loading. It needs a browser with WebAssembly and a page from a server."
     shown = instead or f"<p>{words}</p>"
     return f'<floatbase-robot {written} style="{style}">{shown}</floatbase-robot>'
 

@@ -64,7 +64,7 @@ export function createDrag(viewer, {isWanted, most, show, release}) {
     const {at, node} = begun;
     begun.push = {...pushOf(end.clone().sub(at), full, most()), at, node};
     show(begun.push);
-    newtons.textContent = `${begun.push.force} N`;
+    newtons.textContent = `${begun.push.force} N: let go to push`;
     placeLabel(newtons, viewer, at);
     const ends = [at, end].map((point) => viewer.scene.worldToLocal(point.clone()));
     begun.line.geometry.setFromPoints(ends);

@@ -117,6 +117,9 @@ export function createPanel(send) {
     return {getValue: () => press, show() {}, fire: () => made.click()};
   }
 
+  // what the term under the pointer means, for those who see no titles: on a phone, or in a lecture
+  const explanation = make("p", {ariaHidden: true});
+
   // A term of an equation, above the picture: its symbol shows its arrows, the two boxes switch it
   // off in the controller's model and in the simulated world.
   function toggle({name, value: first, term, part, description = name, disabled = false}) {
@@ -125,7 +128,7 @@ export function createPanel(send) {
     if (!cell) {
       cell = make("div");
       cell.dataset.term = term;
-      board.append(cell);
+      board.append(cell, explanation);
       document.body.classList.add("has-board");
     }
     let value = first;
@@ -145,7 +148,12 @@ export function createPanel(send) {
     made.setAttribute("aria-label", label); // with the text that the button shows
     made.setAttribute("aria-disabled", disabled); // it keeps its title and the keyboard's focus
     show(value);
-    if (!disabled) made.onclick = () => setValue(!value);
+    const explain = () => { explanation.textContent = label; };
+    made.onclick = () => {
+      explain();
+      if (!disabled) setValue(!value);
+    };
+    made.onpointerenter = made.onfocus = explain;
     cell.append(made);
     return {getValue: () => value, show, setValue};
   }

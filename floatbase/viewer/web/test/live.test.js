@@ -117,6 +117,9 @@ test("the sentence names what limits the robot, the most important first", () =>
   assert.deepEqual(points({measured}), []); // the planned force is inside
   assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
   assert.match(text({outcome: "fell"}), /^The robot fell/);
+  const reason = limitOf(frameWith({outcome: "fell"}), robot, "It slipped.").text;
+  assert.match(reason, /fell.*\nJust before: It slipped\.$/);
+  assert.doesNotMatch(text({height: 0.6}), /stands/); // it lies on its legs
   assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
   const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
     ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];

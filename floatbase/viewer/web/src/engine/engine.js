@@ -230,12 +230,13 @@ export function createEngine(mj, module, robot) {
     }
     pushes = pushes.filter(({start, duration}) => start + duration > time);
   }
-  const isAirborne = () => actual.data.xpos[3 * base + 2] > AIRBORNE * startHeight;
+  // The height of the base as a fraction of its height in a standing robot.
+  const heightNow = () => actual.data.xpos[3 * base + 2] / startHeight;
+  const isAirborne = () => heightNow() > AIRBORNE;
   function isFallen() {
-    const {xpos, xmat} = actual.data;
+    const {xmat} = actual.data;
     const axis = [2, 5, 8].reduce((sum, at, i) => sum + xmat[9 * base + at] * startAxis[i], 0);
-    const sunk = startHeight - xpos[3 * base + 2];
-    return sunk > (1 - robot.fallenHeight) * startHeight || axis < robot.fallenCosine;
+    return heightNow() < robot.fallenHeight || axis < robot.fallenCosine;
   }
 
   reset();
@@ -295,6 +296,7 @@ export function createEngine(mj, module, robot) {
       mj.mj_subtreeVel(actual.model, actual.data);
       return [...actual.data.subtree_linvel.subarray(3 * base, 3 * base + 3)];
     },
+    height: heightNow,
     com: () => [...actual.data.subtree_com.subarray(3 * base, 3 * base + 3)],
     measuredForces: () => contactForces(mj, actual, robot, buffer, adhesion()),
     // Planned forces of all contact points, zero for those of a lifted foot.

@@ -173,7 +173,8 @@ function picture() {
     places[3 * geom], places[3 * geom + 1], places[3 * geom + 2] - radius,
   ]);
   return {
-    rotations, positions, contacts, com: engine.com(), time: engine.time, terms: termForces(),
+    rotations, positions, contacts, com: engine.com(), height: engine.height(),
+    time: engine.time, terms: termForces(),
     facets: engine.facets(), conflict: engine.conflict,
     foot: foot && {name: foot, ...engine.frictionValue(foot)},
     measured: engine.measuredForces(), planned: engine.plannedForces(),

@@ -1,38 +1,54 @@
 // The line in the picture that says what to do: drag the robot, and after the first push what else
-// to try.
+// to try. A line stays until it was done, or until the reader asks for the next one.
 
-import {element} from "../dom.js";
+import {element, make} from "../dom.js";
+import {rows} from "../engine/settings.js";
 
-const PERIOD = 12000; // ms for which a line stays
+const WATCHED = 4000; // ms in which the effect of what was done is watched
 const FIRST = "Drag the robot";
+const MOON = 2; // m/s²: less gravity counts as the Moon's
 
-// What to try with a robot. The words in quotation marks are those of the panel.
+const at = (key) => `Open “controls”, then “${rows[key].section}”`;
+
+// What to try with a robot: [line, isDone(frame)]. The words in quotation marks are those of the
+// page. frame: what the worker sends.
 export const triesOf = (robot) => [
-  "Pull farther: at which force does it fall?",
-  "Push it from the front. Is it as strong as from the side?",
-  "Lower the “friction” of “reality” only.",
-  ...(Object.keys(robot.gaits).length ? ["Choose the “gait” trot, and push the robot as it walks."]
-    : []),
-  ...(robot.lifted.length ? ["“lift” a foot: the robot moves its mass over the others first."]
-    : []),
-  "Switch off “model” below “+ g” at the top: the robot sags.",
-  "Lower the “torque limits” until a motor is named above.",
-  "Set “gravity” to 1.6 m/s², as on the Moon, and push again.",
+  ["Pull farther: at which force does it fall?", ({outcome}) => outcome !== ""],
+  ["Push its nose or its tail. Is it as strong as when its side is pushed?",
+    ({pushes}) => pushes.some(({force: [x, y]}) => Math.abs(x) > Math.abs(y))],
+  [`${at("friction")}: lower the friction of reality only, and push.`,
+    ({settings: {mu, actualMu}, pushes}) => actualMu < mu && pushes.length > 0],
+  ...(Object.keys(robot.gaits).length ? [[
+    `${at("gait")}: choose the gait trot, and push the robot as it walks.`,
+    ({settings, pushes}) => settings.gait !== null && pushes.length > 0]] : []),
+  ...(robot.lifted.length ? [[
+    `${at("lift")}: lift a foot. The robot moves its mass over the others first.`,
+    ({settings}) => settings.lifted !== null]] : []),
+  ["Press “model” below “+ g” at the top: the robot no longer knows its weight, and sags.",
+    ({settings}) => settings.assumedOff.includes("gravity")],
+  [`${at("torque_limits")}: lower the torque limits until a motor is named above.`,
+    ({seen}) => seen.some(([kind, , , multiplier]) => kind.endsWith("torque limit") && multiplier)],
+  [`${at("gravity")}: set gravity to 1.6 m/s², as on the Moon, and push again.`,
+    ({settings, pushes}) => settings.gravity < MOON && pushes.length > 0],
 ];
 
-// tries: lines after the first push, each once; then the line goes. Returns a function that a push
-// calls.
+// tries: lines after the first push. Returns a function that each picture calls with its frame.
 export function createHint(tries) {
-  const line = element("hint");
-  let next = 0, hasPushed = false;
+  const box = element("hint"), line = make("span", {textContent: FIRST});
+  const skip = make("button", {
+    type: "button", textContent: "›", title: "another idea", ariaLabel: "another idea",
+  });
+  box.append(line);
+  let next = -1, timer = 0;
   function show() {
-    line.textContent = tries[next++] ?? "";
-    if (next <= tries.length) setTimeout(show, PERIOD);
+    timer = 0;
+    line.textContent = tries[++next]?.[0] ?? "";
+    if (next === 0) box.append(skip);
+    if (next >= tries.length) box.replaceChildren();
   }
-  line.textContent = FIRST;
-  return () => {
-    if (hasPushed) return;
-    hasPushed = true;
-    show();
+  skip.onclick = show;
+  return (frame) => {
+    const isDone = next < 0 ? frame.pushes.length > 0 : tries[next]?.[1](frame);
+    if (isDone && !timer) timer = setTimeout(show, next < 0 ? 0 : WATCHED);
   };
 }

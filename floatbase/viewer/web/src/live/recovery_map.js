@@ -10,7 +10,7 @@ const FEWEST_WORKERS = 2, MOST_WORKERS = 4;
 const HEIGHT = 0.004; // m above the ground
 const NOW = 0x0072b2, BEFORE = 0x777777, RING = 0xbbbbbb;
 const MOST_RINGS = 4, CORNERS = 64; // of a circle
-const LETTERS = 0.05; // height of a label, times the robot's size
+const LETTERS = 0.08; // height of a label, times the robot's size
 const RADIUS = 0.75; // of the largest push, times the robot's size: it fits the picture
 
 // Angles of the directions, rad, an arc for each worker, which begins each search at the result of
@@ -56,8 +56,9 @@ export function mapText(found, what, seconds) {
   const [weak, strong] = [sorted[0], sorted.at(-1)].map(
     ({push, direction}) => `${push} N (${wayOf(direction)})`,
   );
-  return `Largest push of ${DURATION} s that the robot survives (${what}): from ${weak} to ` +
-    `${strong}, ${state}.`;
+  const range = sorted[0].push === sorted.at(-1).push ? `${sorted[0].push} N in all of them`
+    : `from ${weak} to ${strong}`;
+  return `Largest push of ${DURATION} s that the robot survives (${what}): ${range}, ${state}.`;
 }
 
 // viewer: meshcat's. size: of the robot, m. say(text): writes a text into the panel. name: of the

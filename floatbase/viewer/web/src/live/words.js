@@ -5,6 +5,9 @@ import {isInAir} from "../engine/contacts.js";
 const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "rear"};
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
 const MOST_NAMES = 2; // in a sentence
+const IN_AIR = 1; // rank of the sentence about flight, which is no limit
+const LOW = 0.75; // of its height: a lower robot does not stand
+const CALM = 7; // rank of a sentence that names no limit
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
 export function footName(name) {
@@ -75,19 +78,20 @@ export function conflictLines(conflict) {
 }
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
-// sends. robot: its summary.
-export function limitOf(frame, robot) {
+// sends. robot: its summary. before: the sentence about the limit just before the robot fell.
+export function limitOf(frame, robot, before = "") {
   if (frame.outcome) {
-    const before = frame.hasSlipped ? "The feet slipped. " : "";
+    const slipped = frame.hasSlipped ? "The feet slipped. " : "";
     const text = frame.conflict.length ? conflictText(frame.conflict) : STOPPED[frame.outcome];
-    return {rank: 0, text: before + (text ?? frame.outcome)};
+    const reason = slipped || frame.conflict.length || !before ? "" : `\nJust before: ${before}`;
+    return {rank: 0, text: slipped + (text ?? frame.outcome) + reason};
   }
   if (isInAir(frame, robot)) {
-    return {rank: 1, text: "The robot is in the air: the ground exerts no force on its feet."};
+    return {rank: IN_AIR, text: "The robot is in the air: the ground exerts no force on its feet."};
   }
   const slipping = frame.slipping.map(footName);
   if (slipping.length) {
-    return {rank: 1, text: `${subject(slipping)} slipping: the ground gives less friction than ` +
+    return {rank: 2, text: `${subject(slipping)} slipping: the ground gives less friction than ` +
       "the controller plans with."};
   }
   const owners = (part) => frame.seen
@@ -97,30 +101,33 @@ export function limitOf(frame, robot) {
   const motors = owners("torque limit").map(jointName);
   if (motors.length) {
     const many = new Set(motors).size > 1;
-    return {rank: 2, text: `${subject(motors)} at ${many ? "their torque limits" :
+    return {rank: 3, text: `${subject(motors)} at ${many ? "their torque limits" :
       "its torque limit"}.`};
   }
   const unloaded = new Set(owners("normal force").map(footName));
   const gripping = owners("friction").map(footName).filter((name) => !unloaded.has(name));
   if (gripping.length) {
     const many = new Set(gripping).size > 1;
-    return {rank: 3, text: `${subject(gripping)} at ${many ? "their friction limits" :
+    return {rank: 4, text: `${subject(gripping)} at ${many ? "their friction limits" :
       "its friction limit"}.`};
   }
   if (unloaded.size) {
-    return {rank: 4, text: `${subject([...unloaded])} unloaded: a foot can push on the ground, ` +
+    return {rank: 5, text: `${subject([...unloaded])} unloaded: a foot can push on the ground, ` +
       "but not pull."};
   }
   const joints = owners("joint limit").filter((name) => !robot.resting.includes(name))
     .map(jointName);
   if (joints.length) {
     const many = new Set(joints).size > 1;
-    return {rank: 5, text: `${subject(joints)} near the end of ${many ? "their ranges" :
+    return {rank: 6, text: `${subject(joints)} near the end of ${many ? "their ranges" :
       "its range"}.`};
   }
-  const calm = frame.settings.gait ? "The robot walks" : "The robot stands";
-  return {rank: 6, text: `${calm}: no foot and no motor is at a limit.`};
+  const calm = frame.height < LOW ? "The robot is too low" : frame.settings.gait
+    ? "The robot walks" : "The robot stands";
+  return {rank: CALM, text: `${calm}: no foot and no motor is at a limit.`};
 }
+
+export const isLimit = ({rank}) => rank > IN_AIR && rank < CALM;
 
 // Sentences that stay long enough to be read, `stays` ms. Of those in the meantime, the most
 // important one is said.
