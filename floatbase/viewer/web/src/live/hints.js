@@ -14,6 +14,7 @@ const at = (key) => `Open “controls”, then “${rows[key].section}”`;
 // page. frame: what the worker sends.
 export const triesOf = (robot) => [
   ["Pull farther: at which force does it fall?", ({outcome}) => outcome !== ""],
+  ["Point at a foot, or tap it. How far is its force from slipping?", ({foot}) => foot !== null],
   ["Push its nose or its tail. Is it as strong as when its side is pushed?",
     ({pushes}) => pushes.some(({force: [x, y]}) => Math.abs(x) > Math.abs(y))],
   [`${at("friction")}: lower the friction of reality only, and push.`,
