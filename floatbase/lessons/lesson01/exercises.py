@@ -195,8 +195,8 @@ EXERCISES = (
         "at_rest.com[0])",
         judge=NumericJudge(
             right=_held_width,
-            praise="A harder push needs a wider plate. A walking robot cannot widen its plate; "
-            "it puts a foot in the right place in time.",
+            praise="A harder push needs a wider plate. A walking robot cannot widen its plate. "
+            "Instead, it puts a foot in the right place in time.",
             mistakes=_width_mistakes,
         ),
         explanation="Moments about the rear edge: 120 N × height = weight × (half the width + "

@@ -95,8 +95,8 @@ def _judge_fault(answer: Any) -> Verdict:
          "accelerations of the joints. Would a fault there leave the moment rows almost zero?"),
         ("line_3", line == 3, "A wrong state would give a wrong J, so the contact forces would "
          "have wrong moments. The moment rows are almost zero."),
-        ("line_4", line == 4, "A wrong sign or place of the forces would show in the vertical row "
-         "or in the moments, also at 0 ms. There, all rows are zero."),
+        ("line_4", line == 4, "A wrong sign of the forces would show in the vertical row, and a "
+         "wrong place in the moment rows. Both are almost zero, at all times."),
     ]) or ERROR_JUDGE(given[1:])  # fmt: skip
 
 
@@ -162,8 +162,8 @@ def _judge_holding(answer: Any) -> Verdict:
          f"to {np.abs(tau - right).max():.1f} N·m remains."),
     ]) or Verdict(
         True,
-        "Nothing moves. The base rows determined the forces, and then the joint rows determined "
-        "the torques.",
+        "Nothing moves. The base rows hold for your forces, and for these forces the joint rows "
+        "leave only these torques.",
     )  # fmt: skip
 
 
@@ -222,8 +222,9 @@ rows = terms.M @ qdd + terms.h - terms.J.T @ record.measured[i]""",
 fault = np.array([1, *np.cross(omega, v_lin)])""",
         judge=_judge_fault,
         examples=_faults,
-        explanation="The base rows are wrong only while the base turns and moves, at right angles "
-        "to both. They equal the mass times ω × v_lin, which line 1 contains and v̇ does not.",
+        explanation="The base rows are wrong only while the base both turns and moves. The error "
+        "is at right angles to ω and to v_lin. It is the mass times ω × v_lin, which line 1 "
+        "contains and v̇ does not.",
     ),
     Exercise(
         name="02.3",
