@@ -26,7 +26,7 @@ SLOW_PERIOD = 4e-3  # s, for long records
 PUSH_RECOVERY_WATCH_TIME = 4.0  # s: a robot that steps may fall late
 SWING = 0.4  # s: duration of each step after a push
 _FORCE_WEIGHT = 1e-4  # weight of small corner forces relative to an error of the wrench in N²
-LEAN_START, TIME_AFTER_LEAN = 0.2, 1.0  # s: before and after the lean of exercise 09.4
+LEAN_START, TIME_AFTER_LEAN = 0.2, 1.0  # s: before and after the lean of exercise 09.3
 
 
 @cache

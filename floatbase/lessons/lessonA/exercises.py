@@ -117,8 +117,8 @@ def _velocity_mistakes() -> list[Mistake]:
     slope = np.array([v @ inertia_derivative(unit) @ v for unit in np.eye(6)])  # of vᵀ M v
     return [
         ("zero", np.zeros(6), "Nothing there yet."),
-        ("no_half_in_slope", rate - slope, "The kinetic energy is ½ vᵀ M v. The half is missing in "
-         "its gradient."),
+        ("no_half_in_slope", rate - slope, "The kinetic energy is ½ vᵀ M v. The half is missing "
+         "from its gradient."),
         ("rate_alone", rate, "That is Ṁ v alone. The gradient of the kinetic energy is missing."),
         ("slope_sign", rate + 0.5 * slope, "The sign of the gradient is wrong. Forces change the "
          "momentum, and the gradient is on their side of the equation."),
@@ -177,6 +177,6 @@ EXERCISES = (
             mistakes=_velocity_mistakes,
         ),
         explanation="By Lagrange, d/dt (M v) = gradient of ½ vᵀ M v + forces. So M q̈ + (Ṁ v - "
-        "gradient) = forces, and the bracket is C v.",
+        "gradient) = forces, and the expression in brackets is C v.",
     ),
 )

@@ -1,4 +1,4 @@
-"""Lesson A: a puck on a turntable, a tumbling robot, errors against speed, and drifting feet."""
+"""Lesson A: a puck on a turntable, a tumbling robot, errors against speed, and travelling feet."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ SIDE_VIEW = View(62.0, 12.0, 1.0, around=((0.0, 0.0, 0.62), 0.5))
 FEET_VIEW = View(62.0, 24.0, 1.0, around=((0.0, 0.0, 0.16), 0.44))
 MIN_ROD_LENGTH = 1e-3  # m: a shorter rod is not drawn
 PIN_DISTANCE = 0.05  # m: from a foot to its pin, away from the robot, where it is visible
-FRAME_RATE = 10  # pictures per second of the drifting feet
+FRAME_RATE = 10  # pictures per second of the travelling feet
 
 
 def show_turntable(view: Viewer, omega: float, speed: float, time: float) -> str:
@@ -170,7 +170,7 @@ def plot_errors(speeds: Sequence[float], errors: Mapping[str, Sequence[float]]) 
 
 
 def play_travelling_feet(view: Viewer, record: Rollout, speed: float = 4.0) -> Viewer:
-    """Play a robot whose feet drift, with a pin at each foot's first position."""
+    """Play a robot whose feet travel, with a pin at each foot's first position."""
     contacts = record.contacts
     home = contacts.positions(record.state(0))
     rows = np.arange(
