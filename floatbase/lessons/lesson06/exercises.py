@@ -76,6 +76,7 @@ def _facet_mistakes() -> list[Mistake]:
         ("normal_sign", _with_tangents(-BANK_MU * np.cos(np.pi / 5)), "The sign of the normal "
          "component is wrong. With a plus, the constraints forbid pushing."),
         ("no_mu", _rows_from_edges(1.0), "μ is missing: these are the facets for μ = 1."),
+        ("mu_of_lesson", _rows_from_edges(MU), "These are the facets for μ = 0.7. Here μ is 0.5."),
         ("turned", _rows_from_edges(turn=np.pi / 5), "The facets are rotated by half a facet. "
          "Facet 0 must face t1."),
         ("horizontal", _with_tangents(BANK_MU * np.cos(np.pi / 5), level=True), "The directions d "
