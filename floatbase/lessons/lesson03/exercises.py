@@ -184,7 +184,7 @@ def judge_all_pairs(answer: Any) -> Verdict:
         return given
     is_matrix = given.ndim == 2
     right = Verdict(
-        True, "Ten directions for eight motors. You never typed a 10: the singular values gave it."
+        True, "Ten directions for eight motors: two of the twelve singular values of C are zero."
     )
     if is_matrix and shape[0] == 20 and shape[1]:
         return _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:]) or right
