@@ -140,8 +140,8 @@ def _judge_design(answer: Any) -> Verdict:
          "pulled back to τ."),
     ]) or Verdict(
         True,
-        "Three costs, each written in the space where it is simple, and added in the space of the "
-        "motors.",
+        "Each cost is written in the space where it is simple, and all are added in the space of "
+        "the motors.",
     )  # fmt: skip
 
 
