@@ -54,10 +54,10 @@ def zeta_mistakes() -> list[Mistake]:
         return np.asarray(np.linalg.solve(J_Minv @ eom.J.T, both))
 
     return [
-        ("b_missing", columns(b=0.0), "b is missing in z. The robot moves, and its feet stay in "
+        ("b_missing", columns(b=0.0), "b is missing from z. The robot moves, and its feet stay in "
          "place only with J q̈ = b, not 0."),
         ("b_sign", columns(b=-1.0), "The sign of b is wrong. J q̈ equals b in (7)."),
-        ("h_missing", columns(h=0.0), "h is missing in z, so this robot has no weight."),
+        ("h_missing", columns(h=0.0), "h is missing from z, so this robot has no weight."),
         ("h_sign", columns(h=-1.0), "The sign of h is wrong. (7) says q̈ = M⁻¹ (S τ + Jᵀ λ - h). "
          "What remains on the other side when you solve for λ?"),
         ("constant_missing", columns(b=0.0, h=0.0), "z is zero. With τ = 0, does the ground exert "
@@ -117,9 +117,9 @@ def _wrong_pairs() -> list[Mistake]:
     shortest = np.linalg.pinv(C, rcond=RANK_TOLERANCE)
     not_inverted = np.linalg.pinv(np.hstack([J @ M @ S, J @ M @ J.T]), rcond=RANK_TOLERANCE)
     return [
-        ("b_missing", shortest @ (right_side - b), "b is missing on the right-hand side of (10). "
+        ("b_missing", shortest @ (right_side - b), "b is missing from the right-hand side of (10). "
          "solo8 moves, and its feet stay in place only with J q̈ = b, not 0."),
-        ("h_missing", shortest @ b, "h is missing on the right-hand side of (10), so this robot "
+        ("h_missing", shortest @ b, "h is missing from the right-hand side of (10), so this robot "
          "has no weight."),
         ("sign_of_h", shortest @ (2.0 * b - right_side), "The sign of h is wrong. In (8) and (10) "
          "it appears on the right-hand side as + J M⁻¹ h."),
@@ -167,7 +167,7 @@ def _fault_of_directions(V: Array) -> Verdict | None:
          "but they are not orthonormal."),
         ("full_rank", missing == C.shape[0] - rank(C), "v is right, but there are too few "
          "directions. You have removed one for each row of C, but some rows are redundant. How "
-         "many singular values are not zero?"),
+         "many singular values are non-zero?"),
         ("too_few", missing != 0, f"v is right, and so are these directions, but {missing} of them "
          "are missing."),
     ])  # fmt: skip
@@ -184,7 +184,7 @@ def judge_all_pairs(answer: Any) -> Verdict:
         return given
     is_matrix = given.ndim == 2
     right = Verdict(
-        True, "Ten directions for eight motors. You never typed a 10: the singular values gave it."
+        True, "Ten directions for eight motors: two of the twelve singular values of C are zero."
     )
     if is_matrix and shape[0] == 20 and shape[1]:
         return _fault_of_pair(given[:, 0]) or _fault_of_directions(given[:, 1:]) or right

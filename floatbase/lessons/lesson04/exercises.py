@@ -71,8 +71,8 @@ def _parked(record: Rollout) -> Verdict:
     return first_fault([
         ("falls", record.outcome != "completed", "go2 falls. Which sign pulls it back "
          "to the target, and which sign slows it down?"),
-        ("swings", speed > AT_REST, f"The centre of mass does not come to rest: it is {left}. Add "
-         "a damper, a term with the velocity."),
+        ("swings", speed > AT_REST, f"The centre of mass does not come to rest: it is {left}. Is "
+         "there a damper, a term with the velocity, and is the spring stiff enough?"),
         ("stays", abs(missed - np.linalg.norm(TARGET)) < ARRIVED, "The centre of mass stays where "
          "it was. Does your function depend on `target`?"),
         ("misses", missed > ARRIVED, f"At the end the centre of mass is {left}. Use a stiffer "
@@ -140,8 +140,8 @@ def _judge_design(answer: Any) -> Verdict:
          "pulled back to τ."),
     ]) or Verdict(
         True,
-        "Three costs, each written in the space where it is simple, and added in the space of the "
-        "motors.",
+        "Each cost is written in the space where it is simple, and all are added in the space of "
+        "the motors.",
     )  # fmt: skip
 
 
@@ -180,12 +180,12 @@ EXERCISES = (
             praise="The residual subtracts a vector in world axes from a vector in base axes. "
             "The axes agree only as long as the robot faces forwards.",
             refuted={
-                "sign": "With a wrong sign, go2 would accelerate the other way at every heading. "
-                "At 0° the result is right.",
+                "sign": "A wrong sign would have the same effect at every heading. At 0° the "
+                "result is right, at 90° it is wrong.",
                 "transpose": "Rᵀ does take a vector from world axes to base axes. Does everything "
                 "in the residual go there?",
-                "missing term": "A missing term would change the magnitude. It is 0.5 m/s² at "
-                "every heading.",
+                "missing term": "A missing term would have the same effect at every heading. At 0° "
+                "the result is right, at 90° it is wrong.",
             },
             elsewhere="At 0° the result is right, at 90° it is turned by 90°. Which line depends "
             "on the heading?",

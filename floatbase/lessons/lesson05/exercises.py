@@ -149,7 +149,7 @@ def judge_wrench(answer: Any) -> Verdict:
         if not verdict.right:
             return replace(verdict, text=f"{name}: {verdict.text}")
     return Verdict(
-        True, "Newton's law for the force, Euler's for the moment: the goal of every step below."
+        True, "Newton's law for the force, Euler's for the moment: what the controller below wants."
     )
 
 
@@ -186,8 +186,8 @@ def torque_mistakes() -> list[Mistake]:
     C_tau, load, inverse = C[:, :18], C[:, 18:] @ pressed, np.linalg.pinv(C[:, :18])
     standing, lever = space.forces(standing_still_beta(space)), eom.J[:, 6:].T
     return [
-        ("zero", np.zeros(18), "There is no answer yet. Without torques the feet carry hardly "
-         "anything."),
+        ("zero", np.zeros(18), "There is no answer yet. Without torques the feet carry only "
+         "16 % of the weight."),
         ("whole_C", (np.linalg.pinv(C) @ a)[:18], "The pseudo-inverse of the whole C gives the "
          "shortest (τ, λ). But λ is not free: it must be `pressed`."),
         ("a_forgotten", inverse @ -load, "a is missing, and it contains gravity."),
