@@ -9,6 +9,7 @@ import pytest
 
 import floatbase as fb
 from floatbase.actuators import Cylinders, Delay, HydraulicActuators, Hydraulics
+from floatbase.lessons import TorqueCommand
 from floatbase.lessons.lessonB import Bench, hold_then_turn, run_force_loop
 
 ROBOT = judges.load("go2")
@@ -87,5 +88,22 @@ def test_each_pair_of_joints_moves_the_body_its_own_way():
 
     for joint, axis, sign in ((0, 1, -1), (1, 0, 1), (2, 2, 1)):
         record = fb.rollout(fb.Simulation(ROBOT), controller, 0.2, actuators=TooMuch(joint))
-        moved = sign * (record.com[-1] - record.com[0])[axis]
-        assert moved > 0.002
+        assert sign * (record.com[-1] - record.com[0])[axis] > 0.002
+
+
+@pytest.mark.front_end
+def test_planned_forces_and_the_weight_of_the_legs_do_not_hold_go2_without_springs():
+    """Nothing pushes go2: it falls after 6 s, and with springs it stands."""
+    contacts, start = fb.Contacts.points(ROBOT), ROBOT.standing()
+    plan = fb.WholeBodyController(ROBOT, contacts, fb.standing_tasks(start))(start.q, start.v)
+
+    def outcome(kp):
+        def controller(q, v, t):
+            state = fb.State(ROBOT, q, v)
+            J = np.vstack([state.frame_jacobian(foot)[:3, 6:] for foot in contacts.names])
+            springs = kp * (start.q[7:] - q[7:]) - kp / 40 * v[6:]
+            return TorqueCommand(state.h[6:] - J.T @ np.ravel(plan.forces) + springs)
+
+        return fb.rollout(fb.Simulation(ROBOT), controller, 8.0).outcome
+
+    assert (outcome(0.0), outcome(100.0)) == ("fell", "completed")

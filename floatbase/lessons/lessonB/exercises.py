@@ -156,7 +156,7 @@ EXERCISES = (
         judge=NumericJudge(
             right=lambda: GAIN * (WANTED / LEVER - GOT / LEVER),
             praise="If a pull is too weak, oil is needed on the other side. Beyond the dead "
-            "point, moving out and moving in change their roles.",
+            "point, moving out and moving in swap their roles.",
             mistakes=_valve_mistakes,
         ),
         explanation="F = τ / L, with the sign of L. u > 0 feeds A, and the force increases. u < "

@@ -88,7 +88,7 @@ def _judge_guess(answer: Any) -> Verdict:
     if np.linalg.matrix_rank(Z / np.linalg.norm(Z, axis=1)[:, None], 1e-9) < len(rows):
         text = (
             "These constraints depend on one another. The force of a foot has three components, so "
-            "at most three of its constraints can be on."
+            "at most three of its constraints can be in the list."
         )
         return Verdict(False, text, "dependent")
     k = len(rows)

@@ -131,7 +131,7 @@ _SHIFT = NumericJudge(right=_nearest, praise="", mistakes=_shift_mistakes, toler
 def _judge_shift(given: Array) -> Verdict:
     """Judge a shift by geometry, then by how long the robot stands on two feet in simulation."""
     if abs(given[2]) > HEIGHT:
-        text = "Seen from above, the centre of mass keeps its height, so the third number is 0."
+        text = "The shift is horizontal, so the third number is 0."
         return Verdict(False, text, "height")
     off = given - _nearest()
     if np.abs(off).max() > FULL_MILLIMETRE:
