@@ -169,9 +169,9 @@ _GENERAL = {
     "sign": "The magnitude is right, but the sign is wrong. Which body does the force act on, "
     "and in which direction?",
     "transpose": "This is the transpose of the answer.",
-    "unknown": "This is not right, and it is not a mistake that this check recognises. Check "
+    "unknown": "This is not right, and it is not a mistake that this check recognizes. Check "
     "the units, then read the statement again.",
-    "unknown_count": "This is not right, and it is not a mistake that this check recognises. "
+    "unknown_count": "This is not right, and it is not a mistake that this check recognizes. "
     "What is counted? Is anything left out or counted twice?",
 }
 
