@@ -58,3 +58,9 @@ class Setting(NamedTuple):
 
 
 SETTINGS = {key: Setting(**row) for key, row in _ROWS.items()}
+
+
+def push_settings(weight: float) -> dict[str, Setting]:
+    """Return the settings of a push of a robot of this weight [N]."""
+    force = SETTINGS["push"].of_weight(weight)
+    return {"force": force, "towards": SETTINGS["towards"], "duration": SETTINGS["duration"]}

@@ -160,7 +160,7 @@ test("controls begin at the settings of the engine and change what they name", (
   const chosen = [], drawn = [];
   const made = Object.fromEntries(controlsOf({...data, lifted: ["FL_foot"]}, settings, push, {
     names: ["go2"], name: "go2", open() {}, walk: (gait) => { chosen.push(gait); },
-    shove: () => ({push: push.force}), draw: (...term) => { drawn.push(term); },
+    draw: (...term) => { drawn.push(term); },
   }).map((control) => [control.command.name, control]));
   for (const {command, shown} of Object.values(made)) {
     if (shown) assert.equal(command.value, shown(settings));
@@ -177,9 +177,8 @@ test("controls begin at the settings of the engine and change what they name", (
     assert.deepEqual(change(min), {set: {[setting]: 0.01 * min}});
     assert.ok(min < max);
   }
-  assert.deepEqual(made["push [N]"].change(55), {push: 55});
-  assert.equal(made["push [N]"].change(0), undefined);
-  assert.equal(push.force, 0);
+  assert.equal(made["push [N]"].change(55), undefined); // the button pushes
+  assert.equal(push.force, 55);
   assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
   assert.deepEqual(made.lift.change(1), {set: {lifted: "FL_foot"}});
   made.gait.change(1);
@@ -248,12 +247,27 @@ test("a judge names what must not be changed in the words of the controls", () =
   for (const text of said) assert.doesNotMatch(text, /_|Off/);
 });
 
+test("a very short push is no large one, but it is a push", () => {
+  const judges = Object.fromEntries(challenges.map((challenge) => (
+    [challenge.judge, createJudge(challenge, defaults(go2))])));
+  const sample = {time: 0, span: 1, feet: [], facets: []};
+  for (const duration of [0.05, 0.1]) {
+    for (const name of ["survive", "topple"]) {
+      judges[name].push({force: [300, 0, 0], duration});
+      judges[name].observe(sample, defaults(go2));
+    }
+    const said = judges.survive.status.message;
+    assert.match(said, duration < 0.1 ? /^Push the robot/ : /^Standing/);
+  }
+  assert.match(judges.topple.status.message, /more than one push/);
+});
+
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
     legs: Object.keys(go2.legs), points: Object.keys(go2.legs), gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
-    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), shove() {},
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}),
     draw() {}, watch() {},
   });
   const names = made.map(({command: {name, column = ""}}) => name.replace(column, "").trim());

@@ -35,9 +35,9 @@ export function settingsText(controls, settings, first) {
 // the worker: {set}, {timeScale} and others. shown returns the value for settings of the engine; it
 // is null for a control of something else. push: {force, towards, duration}, changed in place.
 // open: called with another robot's name. walk: called with the name of a gait, or null to stand.
-// shove(): returns the message that pushes the robot. draw: called with a term of eq. (7), and
-// whether to draw it. watch: called with the name of a contact point, or null.
-export function controlsOf(robot, settings, push, {names, name, open, walk, shove, draw, watch}) {
+// draw: called with a term of eq. (7), and whether to draw it. watch: called with the name of a
+// contact point, or null.
+export function controlsOf(robot, settings, push, {names, name, open, walk, draw, watch}) {
   const control = (label, command, change, shown = null) => {
     const present = shown ? {value: shown(settings)} : {};
     return {
@@ -86,10 +86,7 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, shov
 
   const gaits = Object.keys(robot.gaits);
   return [
-    ranged("push", "", {value: push.force, on_release: true}, (value) => {
-      push.force = value;
-      return value > 0 ? shove() : undefined;
-    }),
+    ranged("push", "", {value: push.force, on_release: true}, (value) => { push.force = value; }),
     ranged("towards", "", {value: push.towards}, (value) => { push.towards = value; }),
     ranged("duration", "", {value: push.duration}, (value) => { push.duration = value; }),
     ranged("speed", "", {value: rows.speed.first}, (value) => ({timeScale: value})),

@@ -139,8 +139,16 @@ export function createRecoveryMap(viewer, {size, name, say}) {
     end();
     say(`The push-recovery map stopped: ${reason}. Press the button to start it again.`);
   }
+  // Remove the maps.
+  function clear() {
+    end();
+    drawn.forEach(remove);
+    maps.length = drawn.length = 0;
+    say("");
+    viewer.set_dirty();
+  }
   // settings: those of the page. what: what is special about them. centre: below the robot, [x, y].
-  return function start(settings, what, centre) {
+  function start(settings, what, centre) {
     end();
     const mine = {found: [], what, centre}, begun = performance.now();
     maps.splice(1);
@@ -164,5 +172,6 @@ export function createRecoveryMap(viewer, {size, name, say}) {
       }});
       return worker;
     });
-  };
+  }
+  return {start, clear};
 }
