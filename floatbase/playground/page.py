@@ -17,7 +17,7 @@ from floatbase.errors import FloatbaseError, ViewerError, unknown_name
 from floatbase.live.settings import SETTINGS, push_settings
 from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
-from floatbase.playground.equation import SYMBOLS
+from floatbase.playground.equation import EQUATION
 from floatbase.playground.limits import limit_text
 from floatbase.playground.panel import Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
@@ -34,7 +34,6 @@ _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
 _MAX_HISTORY = 100  # changes that `undo` remembers
-_SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
 
 class Playground:
@@ -87,7 +86,7 @@ class Playground:
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
         self.last_push: fb.Push | None = None
-        self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
+        self.shown_terms = {term.name: term.is_shown for term in EQUATION}
         self._pause_after_slice = False  # then the user must press run
         self._history: list[Settings] = []  # what `undo` restores, the last one first
         self._last_change: tuple[frozenset[str], float] = (frozenset(), -math.inf)  # fields, time
@@ -258,7 +257,7 @@ class Playground:
         """
         self.force, self.towards, self.duration = self._first_push
         self.last_push = None
-        self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
+        self.shown_terms |= {term.name: term.is_shown for term in EQUATION}
         self.run.set_time_scale(1.0)
         self._panel.show_view_settings(1.0)
         self._restart_with(

@@ -18,7 +18,7 @@ export function pushOf({x, z}, full, most) {
 // {force, towards, at, node}, with the point that was grabbed, y up, and the meshcat node it is in.
 export function createDrag(viewer, {isWanted, most, show, release}) {
   const canvas = viewer.renderer.domElement, newtons = make("output", {className: "newtons"});
-  document.body.append(newtons);
+  element("page").append(newtons);
   let begun = null; // {at, plane, line, node, push} while the robot is dragged
 
   function rayTo({clientX, clientY}) {

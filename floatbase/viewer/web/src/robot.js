@@ -180,7 +180,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
       scene.handle({type: "set_text", path: "", name: "explained", text: content, section});
     }
   }
-  else document.body.append(pushButton());
+  else element("page").append(pushButton());
   if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
 
@@ -193,6 +193,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   }
   const tell = createVoice((text) => {
     scene.handle({type: "set_title", path: "", text});
+    element("title").title = frame?.conflict.length ? conflictLines(frame.conflict) : "";
     parent.postMessage({floatbase: "limit", text}, "*");
   });
   createDrag(scene.viewer, {

@@ -121,7 +121,7 @@ test("the sentence names what limits the robot, the most important first", () =>
   const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
     ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
   assert.match(text({outcome: "infeasible", conflict}),
-    /friction of the front left foot; torque limit of the rear left calf joint and rear left hip/);
+    /friction of the front left foot, torque limit of the rear left calf joint and 1 more\./);
   assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
 });
 

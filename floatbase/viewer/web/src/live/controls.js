@@ -11,7 +11,6 @@ const SIDES = { // texts on the switches of a term
 const NO_ARROWS = "This page draws no arrows for this term. The playground does.";
 const CHALLENGED = "go2"; // the robot with challenges, as in the playground
 const titles = challenges.map(({title}) => title);
-export const SHOWN_AT_FIRST = ["forces", "cones"]; // terms
 
 // The text of a control, such as "CoM x [cm]". row: of the table of settings.
 export const labelOf = ({name, symbol = "", unit = ""}) => (
@@ -73,10 +72,9 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, draw
       return !now[setting].includes(term.name);
     });
   const board = terms.flatMap((term) => {
-    const isDrawn = term.page_arrow || SHOWN_AT_FIRST.includes(term.name);
+    const {is_shown: isShown = false} = term, isDrawn = term.page_arrow || isShown;
     const command = {
-      term: term.symbol, part: "shown", value: SHOWN_AT_FIRST.includes(term.name),
-      disabled: !isDrawn,
+      term: term.symbol, part: "shown", value: isShown, disabled: !isDrawn,
       description: isDrawn ? `show ${term.arrow ?? term.name}` : `${term.arrow}. ${NO_ARROWS}`,
     };
     const switches = Object.entries(SIDES).filter(([side]) => term[`${side}_switch`])
