@@ -152,6 +152,7 @@ export function createRecoveryMap(viewer, {size, name, say}) {
     end();
     const mine = {found: [], what, centre}, begun = performance.now();
     maps.splice(1);
+    if (maps[0]?.what === what) maps.shift(); // the same again
     maps.unshift(mine);
     const free = (navigator.hardwareConcurrency || 2) - 1; // one core draws
     const count = Math.max(FEWEST_WORKERS, Math.min(MOST_WORKERS, free));
