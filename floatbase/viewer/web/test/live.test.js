@@ -14,7 +14,7 @@ import {controlsOf, labelOf} from "../src/live/controls.js";
 import {footText, nearestFacet, polygon} from "../src/live/foot_view.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
-import {deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
+import {briefly, deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
 import {
   conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
 } from "../src/live/words.js";
@@ -129,6 +129,12 @@ test("parts have names that a reader knows", () => {
   assert.equal(footName("HR_FOOT"), "rear right foot");
   assert.equal(footName("left_sole_link corner 1"), "left foot");
   assert.equal(jointName("RL_thigh_joint"), "rear left thigh joint");
+});
+
+test("the label of a map has few settings", () => {
+  assert.equal(briefly("standing, facets 8, CoM x [cm] 2"), "standing, facets 8, CoM x [cm] 2");
+  assert.equal(briefly("trot, 0.3 m/s, facets 8, CoM x [cm] 2, CoM y [cm] 1"),
+    "trot, 0.3 m/s, facets 8 and 2 more");
 });
 
 test("a sentence stays long enough to be read, and a more important one waits for its turn", () => {
