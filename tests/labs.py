@@ -16,7 +16,7 @@ from browsers import SCREENSHOTS
 
 from floatbase.lessons.lab import SETTINGS
 
-IDLE = {"towards [°]"}  # sliders that show nothing by themselves: this one aims the next push
+IDLE = {"towards [°]", "duration [s]"}  # sliders of the next push, which show nothing by themselves
 WINDOW: dict[str, Any] = {
     "viewport": {"width": 1100, "height": 800},
     "device_scale_factor": 0.5,

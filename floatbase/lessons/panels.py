@@ -17,14 +17,14 @@ from floatbase._validation import (
     as_array,
     as_bool,
     as_instance,
-    as_positive,
     as_string,
     short_repr,
     signature_error,
 )
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.lessons.slider_samples import DIRECTIONS, precomputed_panel, recorded_pushes
-from floatbase.live.settings import SETTINGS
+from floatbase.live.settings import SETTINGS, push_settings
+from floatbase.robots import Robot
 from floatbase.simulation import Controller, LiveSimulation, Push, Rollout, Simulation
 from floatbase.viewer import PUSH_DISPLAY_TIME, Viewer, status_message
 from floatbase.viewer.export.display_mode import display_mode
@@ -36,6 +36,7 @@ from floatbase.viewer.transport.notebook_events import receive_during_cells
 _MIN_SLIDER_WIDTH = "min(340px, 100% - 4px)"
 # em: largest mean width of a letter in a slider's name; width of the name on a narrow page
 _LETTER_WIDTH, _MAX_NAME_WIDTH = 0.55, 10.4
+_RECORDED_PUSHES = (0.3, 0.6, 1.0, 1.5)  # robot weights: the pushes of a static page
 
 # sliders ------------------------------------------------------------------------------------------
 
@@ -286,14 +287,22 @@ def live_run(
     return LiveSimulation(sim, controller, show, **options)
 
 
-def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> widgets.VBox:
-    """Return a live picture with controls that push the robot in a horizontal direction for 0.1 s.
+def push_sliders(robot: Robot) -> list[widgets.FloatSlider]:
+    """Return sliders for the force, the direction and the duration of a push."""
+    return [
+        labelled_slider(row.label, row.low, row.first, row.high, row.step, on_release=True)
+        for row in push_settings(robot.weight).values()
+    ]
 
-    The first slider sets the force [N] and pushes when it is released. The second sets the
-    direction [°]: 0 is forwards, 90 to the robot's left (+y at the start), 180 backwards. The
-    button *push* pushes again, and dragging the robot in the picture pushes it that way. A push
-    starts the simulation, as *run* does; both first put a fallen robot back on its feet. *pause*
-    stops the simulation, and *reset* restores the initial state and both sliders. The third slider
+
+def push_panel(run: LiveSimulation, view: Viewer) -> widgets.VBox:
+    """Return a live picture with controls that push the robot in a horizontal direction.
+
+    The first slider sets the force [N] and pushes when it is released. The others set the
+    direction [°] and the duration [s]: 0° is forwards, 90° to the robot's left (+y at the start),
+    180° backwards. The button *push* pushes again, and dragging the robot in the picture pushes it
+    that way. A push starts the simulation, as *run* does; both first put a fallen robot back on its
+    feet. *pause* stops the simulation, and *reset* restores the initial state. The last slider
     slows down time. A line shows the status and why the simulation stopped.
 
     Parameters
@@ -303,8 +312,6 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     view : Viewer
         Viewer that the simulation draws into. It needs its own `Viewer`: the picture stops when
         `view` is displayed again in a later cell.
-    max_force : float, optional
-        Largest push [N].
 
     Returns
     -------
@@ -318,14 +325,9 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
     """
     as_instance("run", run, LiveSimulation)
     as_instance("view", view, Viewer)
-    max_force = as_positive("max_force", max_force, "N")
-    force = labelled_slider(
-        SETTINGS["push"].label, 0.0, 0.0, max_force, SETTINGS["push"].step, on_release=True
-    )
-    towards, speed = (
-        labelled_slider(row.label, row.low, row.first, row.high, row.step, on_release=True)
-        for row in (SETTINGS["towards"], SETTINGS["speed"])
-    )
+    force, towards, duration = push_sliders(run.sim.robot)
+    row = SETTINGS["speed"]
+    speed = labelled_slider(row.label, row.low, row.first, row.high, row.step, on_release=True)
     speed.observe(lambda change: run.set_time_scale(change["new"]), names="value")
     line = _StatusLine(run)
 
@@ -333,9 +335,10 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
         if not force.value:
             line.value = "The push is 0 N. Set the force first."
             return
-        run.push(Push.horizontal(force.value, towards.value).force)
+        run.push(Push.horizontal(force.value, towards.value).force, duration.value)
         line.show_status(
-            f"pushed with {force.value:.0f} N {_direction_text(towards.value)} for 0.1 s"
+            f"pushed with {force.value:.0f} N {_direction_text(towards.value)} "
+            f"for {duration.value:g} s"
         )
 
     def let_go(change: dict[str, Any]) -> None:
@@ -349,10 +352,6 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
         else:
             force.value = newtons
 
-    def reset() -> None:
-        force.value, towards.value = 0.0, 90.0
-        run.reset()
-
     def button(text: str, does: Callable[[], None]) -> widgets.Button:
         def pressed(_: Any) -> None:
             does()
@@ -362,31 +361,30 @@ def push_panel(run: LiveSimulation, view: Viewer, max_force: float = 60.0) -> wi
 
     run.on_status(lambda _: line.show_status())
     force.observe(let_go, names="value")
-    view.on_drag(dragged, max_force)
-    buttons = [button("run", run.start), button("pause", run.pause), button("reset", reset)]
+    view.on_drag(dragged, force.max)
+    buttons = [button("run", run.start), button("pause", run.pause), button("reset", run.reset)]
     wrapped = widgets.Layout(flex_flow="row wrap")
     aim, bar = (
         widgets.HBox(parts, layout=wrapped)
         for parts in ([towards, _button("push", push)], [*buttons, line])
     )
-    rows = [force, aim, speed, bar]
-    return _PushPanel(run, view, max_force, rows)
+    return _PushPanel(run, view, [force, aim, duration, speed, bar])
 
 
 class _PushPanel(Panel):
     """Live picture with controls that push its robot, made by `push_panel`."""
 
-    def __init__(
-        self, run: LiveSimulation, view: Viewer, max_force: float, rows: Sequence[widgets.Widget]
-    ):
+    def __init__(self, run: LiveSimulation, view: Viewer, rows: Sequence[widgets.Widget]):
         super().__init__([view.widget(), *rows])
-        self._run, self._view, self._max_force = run, view, max_force
+        self._run, self._view = run, view
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         if display_mode() == "site":
-            forces = [self._max_force * part / 4 for part in (1, 2, 3, 4)]
+            weight = self._run.sim.robot.weight
             return recorded_pushes(
-                {"": (self._view, self._run.sim, self._run.controller)}, forces, list(DIRECTIONS)
+                {"": (self._view, self._run.sim, self._run.controller)},
+                [round(part * weight) for part in _RECORDED_PUSHES],
+                list(DIRECTIONS),
             )
         return panel_bundle(self, self.children[0])
 

@@ -1,9 +1,9 @@
 """The controls of the live page, the playground and the lessons.
 
-`settings.json` has one row for each control, `equation.json` one for each term of eq. (7), and
-`challenges.json` one for each challenge. Name, unit, range and initial value of a control are the
-same in all of its places. The live page contains the tables (`make web`), and its engine accepts
-no other values.
+`settings.json` has one row for each control, `equation.json` one for each term of eq. (7),
+`challenges.json` one for each challenge, and `limits.json` has the sentences about what limits a
+robot. Name, unit, range and initial value of a control are the same in all of its places. The live
+page contains the tables (`make web`), and its engine accepts no other values.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ def _table(name: str) -> Any:
 _ROWS: dict[str, dict[str, Any]] = _table("settings.json")
 TERMS: list[dict[str, Any]] = _table("equation.json")  # of eq. (7)
 CHALLENGE_TABLE: dict[str, Any] = _table("challenges.json")
+LIMIT_TABLE: dict[str, Any] = _table("limits.json")  # sentences about what limits a robot
 
 
 class Setting(NamedTuple):
@@ -58,3 +59,9 @@ class Setting(NamedTuple):
 
 
 SETTINGS = {key: Setting(**row) for key, row in _ROWS.items()}
+
+
+def push_settings(weight: float) -> dict[str, Setting]:
+    """Return the settings of a push of a robot of this weight [N]."""
+    force = SETTINGS["push"].of_weight(weight)
+    return {"force": force, "towards": SETTINGS["towards"], "duration": SETTINGS["duration"]}

@@ -6,7 +6,7 @@ The playground runs in a notebook or on a separate page.
 from floatbase.errors import explain_arguments
 from floatbase.playground.build import nodding_rotation
 from floatbase.playground.challenges import CHALLENGES, Challenge, Judge
-from floatbase.playground.equation import EQUATION, SYMBOLS, Term
+from floatbase.playground.equation import EQUATION, Term
 from floatbase.playground.limits import limit_text
 from floatbase.playground.mismatch import ModelMismatch
 from floatbase.playground.page import Playground, mean_force_error, playground
@@ -21,7 +21,6 @@ __all__ = [
     "EQUATION",
     "GAITS",
     "PERIOD",
-    "SYMBOLS",
     "BaseMotors",
     "Challenge",
     "Judge",

@@ -75,8 +75,9 @@ class Judge:
 
     @property
     def largest_push(self) -> float | None:
-        """Largest force of a push so far [N]; None before the first push."""
-        return max((float(np.linalg.norm(push.force)) for push in self.pushes), default=None)
+        """Largest force of a push so far [N], without very short ones; None before the first."""
+        pushes = (push for push in self.pushes if push.duration >= _LIMITS["push_time"])
+        return max((float(np.linalg.norm(push.force)) for push in pushes), default=None)
 
     def observe(self, record: fb.Rollout, session: Session) -> None:
         """Judge a new slice of the run.

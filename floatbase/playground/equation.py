@@ -28,6 +28,8 @@ class Term(NamedTuple):
         What the arrows of the term are; "" if the viewer draws the term itself.
     page_arrow : bool
         Whether the live page draws these arrows, too.
+    is_shown : bool
+        Whether the term is drawn initially.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Term(NamedTuple):
     perturbation_option: str = ""
     arrow: str = ""
     page_arrow: bool = False
+    is_shown: bool = False
 
     @property
     def switches(self) -> dict[str, str]:
@@ -47,4 +50,3 @@ class Term(NamedTuple):
 
 
 EQUATION = tuple(Term(**row) for row in TERMS)
-SYMBOLS = {term.name: term.symbol for term in EQUATION}

@@ -9,6 +9,7 @@ import numpy as np
 from floatbase._validation import as_instance
 from floatbase.dynamics import Contacts
 from floatbase.friction import FrictionPolyhedron
+from floatbase.live.settings import LIMIT_TABLE
 from floatbase.playground.settings import Settings
 from floatbase.simulation import Rollout
 
@@ -17,15 +18,13 @@ _UNLOADED = 0.01  # fraction of the weight: a point with less does not stand
 _LOAD_TOLERANCE = 0.01  # N: a planned force this close to the smallest one is at it
 _TORQUE_TOLERANCE = 1e-4  # fraction of a torque limit
 _FACET_TOLERANCE = 1e-4  # fraction of the normal force
-_MOST_NAMES = 2  # in a sentence
-_PLACES = {"F": "front", "R": "rear", "H": "rear"}  # of a leg, by the letters in its names
-_SIDES = {"L": "left", "R": "right"}
+_ENDS, _SIDES = LIMIT_TABLE["ends"], LIMIT_TABLE["sides"]  # of a leg, by the letters in its name
 
 
 def foot_name(contact: str) -> str:
     """Return the name of a contact's foot for a reader, such as "front left foot"."""
     if found := re.match(r"([FRH])([LR])_", contact, re.IGNORECASE):
-        return f"{_PLACES[found[1].upper()]} {_SIDES[found[2].upper()]} foot"
+        return f"{_ENDS[found[1].upper()]} {_SIDES[found[2].upper()]} foot"
     human = re.search("left|right", contact)
     return f"{human[0]} foot" if human else contact
 
@@ -33,7 +32,7 @@ def foot_name(contact: str) -> str:
 def joint_name(joint: str) -> str:
     """Return the name of a joint for a reader, such as "front left calf joint"."""
     if found := re.fullmatch(r"([FRH])([LR])_(.+?)(?:_joint)?", joint):
-        return f"{_PLACES[found[1]]} {_SIDES[found[2]]} {found[3].lower()} joint"
+        return f"{_ENDS[found[1]]} {_SIDES[found[2]]} {found[3].lower()} joint"
     return joint.replace("_", " ")
 
 
@@ -66,27 +65,25 @@ def limit_text(record: Rollout, settings: Settings) -> str:
         and contacts.n_points
         and not (np.abs(measured) > _UNLOADED * robot.weight).any()
     ):
-        return "The robot is in the air: the ground exerts no force on its feet."
-    if slipping := _slipping(contacts, measured, planned, settings, robot.weight):
-        return (
-            f"{_subject(slipping)} slipping: the ground gives less friction than the controller "
-            f"plans with."
-        )
+        return str(LIMIT_TABLE["air"])
     largest = settings.torque_fraction * robot.torque_limits * (1.0 - _TORQUE_TOLERANCE)
     at_limit = np.flatnonzero(np.abs(record.tau_desired[-1]) >= largest)
-    if motors := [joint_name(robot.joint_names[i]) for i in at_limit]:
-        limit = "their torque limits" if len(motors) > 1 else "its torque limit"
-        return f"{_subject(motors)} at {limit}."
     gripping, unloaded = _friction_limits(record, settings)
-    if gripping:
-        limit = "their friction limits" if len(gripping) > 1 else "its friction limit"
-        return f"{_subject(gripping)} at {limit}."
-    if unloaded:
-        return f"{_subject(unloaded)} unloaded: a foot can push on the ground, but not pull."
+    found = {
+        "slipping": _slipping(contacts, measured, planned, settings, robot.weight),
+        "torque": [joint_name(robot.joint_names[i]) for i in at_limit],
+        "friction": gripping,
+        "unloaded": unloaded,
+    }
+    for limit, one, several in LIMIT_TABLE["limits"]:
+        if names := found.get(limit):
+            return f"{_subject(names)} {several if len(names) > 1 else one}"
     if not robot.is_floating:
         return "No motor is at a limit."
-    calm = "The robot walks" if settings.gait else "The robot stands"
-    return f"{calm}: no foot and no motor is at a limit."
+    wanted = robot.standing().q[2] + settings.com_shift[2]
+    if record.q[-1, 2] < LIMIT_TABLE["low_height"] * wanted:
+        return str(LIMIT_TABLE["low"])
+    return str(LIMIT_TABLE["walks" if settings.gait else "stands"])
 
 
 def _slipping(
@@ -134,8 +131,8 @@ def _feet(contacts: Contacts, chosen: np.ndarray) -> list[str]:
 
 
 def _subject(names: list[str]) -> str:
-    """Return the beginning of a sentence, such as "The front left foot is"."""
-    shown = [f"the {name}" for name in names[:_MOST_NAMES]]
-    more = len(names) - len(shown)
-    text = f"{', '.join(shown)} and {more} more" if more else " and ".join(shown)
-    return f"{text[0].upper()}{text[1:]} {'are' if len(names) > 1 else 'is'}"
+    """Return the subject of a sentence, such as "The front left foot"."""
+    most = LIMIT_TABLE["most_names"]
+    shown, more = [f"the {name}" for name in names[:most]], len(names) - most
+    text = f"{', '.join(shown)} and {more} more" if more > 0 else " and ".join(shown)
+    return f"T{text[1:]}"

@@ -12,12 +12,12 @@ import numpy as np
 
 import floatbase as fb
 from floatbase._locks import InterruptibleLock
-from floatbase._validation import as_bool, as_instance, as_number
+from floatbase._validation import as_bool, as_instance, as_number, as_positive
 from floatbase.errors import FloatbaseError, ViewerError, unknown_name
-from floatbase.live.settings import SETTINGS
+from floatbase.live.settings import SETTINGS, push_settings
 from floatbase.playground import build
 from floatbase.playground.challenges import Challenge, Judge
-from floatbase.playground.equation import SYMBOLS
+from floatbase.playground.equation import EQUATION
 from floatbase.playground.limits import limit_text
 from floatbase.playground.panel import Panel
 from floatbase.playground.real_time_factor import RealTimeFactor
@@ -34,7 +34,6 @@ _SITE_NOTE = "The playground runs only in the live lesson. Here its robot stands
 _AIRBORNE_HEIGHT = 1.2  # times the height of the standing centre of mass
 _SAME_CHANGE_TIME = 1.0  # s between two changes of the same fields that `undo` treats as one
 _MAX_HISTORY = 100  # changes that `undo` remembers
-_SHOWN_AT_FIRST = ("forces", "cones")  # terms that are drawn initially
 
 
 class Playground:
@@ -78,16 +77,16 @@ class Playground:
         )
         self.session = Session(robot, settings)
         self._initial_settings = self.session.settings
-        self.push_setting = SETTINGS["push"].of_weight(robot.weight)
-        self.force = self.push_setting.first  # N
-        self.towards = SETTINGS["towards"].first  # degrees: 0 is forwards, 90 to the left
+        self.push_settings = push_settings(robot.weight)
+        # N; degrees: 0 is forwards, 90 to the left; s
+        self.force, self.towards, self.duration = self._first_push
         # of an arm, its tip
         self.pushed_frame = "base" if robot.is_floating else robot.model.frames[-1].name
         self.outcome = ""
         self.challenge: Challenge | None = None
         self.judge: Judge | None = None
         self.last_push: fb.Push | None = None
-        self.shown_terms = {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
+        self.shown_terms = {term.name: term.is_shown for term in EQUATION}
         self._pause_after_slice = False  # then the user must press run
         self._history: list[Settings] = []  # what `undo` restores, the last one first
         self._last_change: tuple[frozenset[str], float] = (frozenset(), -math.inf)  # fields, time
@@ -129,27 +128,36 @@ class Playground:
         self.run.close()
         self.view.close()
 
-    def push(self, force: float | None = None, towards: float | None = None) -> None:
-        """Push the robot for a tenth of a second.
+    def push(
+        self,
+        force: float | None = None,
+        towards: float | None = None,
+        duration: float | None = None,
+    ) -> None:
+        """Push the robot.
+
+        What is not given is what was set last.
 
         Parameters
         ----------
         force : float, optional
-            Horizontal force [N]. By default, the force that was set last.
+            Horizontal force [N].
         towards : float, optional
-            Direction of the push [degrees]: 0 is forward, 90 to the left. By default, the direction
-            that was set last.
+            Direction of the push [degrees]: 0 is forward, 90 to the left.
+        duration : float, optional
+            Duration of the push [s].
 
         Raises
         ------
         InputError
-            If an argument is not a number.
+            If an argument is not a number, or if the duration is not positive.
         """
         size = as_number("force", self.force if force is None else force, "N")
         angle = as_number("towards", self.towards if towards is None else towards, "degrees")
-        self.force, self.towards = size, angle
-        self.last_push = fb.Push.horizontal(size, angle, frame=self.pushed_frame)
-        self.run.push(self.last_push.force, frame=self.pushed_frame)
+        lasting = as_positive("duration", self.duration if duration is None else duration, "s")
+        self.force, self.towards, self.duration = size, angle, lasting
+        self.last_push = fb.Push.horizontal(size, angle, duration=lasting, frame=self.pushed_frame)
+        self.run.push(self.last_push.force, lasting, self.pushed_frame)
         self._update_text()
 
     def set(self, **changes: Any) -> None:
@@ -187,6 +195,11 @@ class Playground:
                 self._request(asdict(former))
                 self._panel.show_settings(former)
                 return
+
+    @property
+    def _first_push(self) -> tuple[float, ...]:
+        """Initial force, direction and duration of a push."""
+        return tuple(row.first for row in self.push_settings.values())
 
     def _remember_before(self, fields: frozenset[str]) -> None:
         """Store the settings before a change of these fields, unless the change continues one."""
@@ -242,9 +255,9 @@ class Playground:
 
         During a challenge, its initial settings are restored.
         """
-        self.force, self.towards = self.push_setting.first, SETTINGS["towards"].first
+        self.force, self.towards, self.duration = self._first_push
         self.last_push = None
-        self.shown_terms |= {term: term in _SHOWN_AT_FIRST for term in SYMBOLS}
+        self.shown_terms |= {term.name: term.is_shown for term in EQUATION}
         self.run.set_time_scale(1.0)
         self._panel.show_view_settings(1.0)
         self._restart_with(
@@ -264,7 +277,7 @@ class Playground:
         with self._lock:
             self._applying = asdict(settings)
         self._change()
-        self._panel.show_settings(self.session.settings)
+        self._panel.show_settings(self.pending_settings)
         self._update_run()
         self._update_text()
 

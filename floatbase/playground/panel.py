@@ -67,9 +67,7 @@ _QP_SLIDERS = (
         for index, name in enumerate(("motion", "posture", "effort"))
     ),
 )
-_TOWARDS, _SPEED, _LIFT, _GAIT, _CHALLENGE = (
-    SETTINGS[key] for key in ("towards", "speed", "lift", "gait", "challenge")
-)
+_SPEED, _LIFT, _GAIT, _CHALLENGE = (SETTINGS[key] for key in ("speed", "lift", "gait", "challenge"))
 _SWITCH_WORDS = {"assumed_off": "model", "actual_off": "reality"}  # texts on the switches
 _FREE_PLAY = "free play"
 
@@ -95,9 +93,9 @@ class Panel:
             if key != "undo" or play.robot.is_floating:
                 view.add_button(SETTINGS[key].name, press)
         view.add_text("invitation", self._invitation)
-        push, towards = play.push_setting, partial(setattr, play, "towards")
-        view.add_slider(push.label, self._push, play.force, *push.range, on_release=True)
-        view.add_slider(_TOWARDS.label, towards, play.towards, *_TOWARDS.range)
+        for name, row in play.push_settings.items():
+            changed, value = partial(setattr, play, name), getattr(play, name)
+            view.add_slider(row.label, changed, value, *row.range, on_release=name == "force")
         view.add_slider(_SPEED.label, play.run.set_time_scale, _SPEED.first, *_SPEED.range)
         if not play.robot.is_floating:
             return
@@ -135,10 +133,7 @@ class Panel:
     def _add_challenges(self) -> None:
         """Add the menu of challenges, if the robot has any."""
         if self._playground.robot.name in {challenge.robot for challenge in CHALLENGES}:
-            titles = [
-                _FREE_PLAY,
-                *(f"{i + 1}. {challenge.title}" for i, challenge in enumerate(CHALLENGES)),
-            ]
+            titles = [_FREE_PLAY, *(challenge.title for challenge in CHALLENGES)]
             self._playground.view.add_dropdown(
                 _CHALLENGE.label,
                 lambda i: self._playground.start_challenge(CHALLENGES[i - 1] if i else None),
@@ -172,12 +167,6 @@ class Panel:
             f"{first} Then switch off a term of the equation above the picture, in the "
             f"controller's model or in reality. A dark switch is off."
         )
-
-    def _push(self, force: float) -> None:
-        """Push the robot with this force [N]; a force of zero is only stored."""
-        self._playground.force = force
-        if force:
-            self._playground.push(force)
 
     @property
     def has_gaits(self) -> bool:
@@ -230,8 +219,7 @@ class Panel:
         play = self._playground
         values: dict[str, Any] = {
             _SPEED.label: speed,
-            play.push_setting.label: play.force,
-            _TOWARDS.label: play.towards,
+            **{row.label: getattr(play, name) for name, row in play.push_settings.items()},
         }
         if play.robot.is_floating:
             values |= {f"show {term.name}": play.shown_terms[term.name] for term in EQUATION}

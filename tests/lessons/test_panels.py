@@ -124,8 +124,8 @@ class Pushed:
         self.view = fb.Viewer(robot)
         self.sim = fb.Simulation(robot)
         self.run = live_run(self.sim, controller, self.view)
-        panel = push_panel(self.run, self.view, max_force=600.0)
-        _, self.force, row, self.speed, buttons = panel.children
+        panel = push_panel(self.run, self.view)
+        _, self.force, row, self.duration, self.speed, buttons = panel.children
         self.towards, self.push = row.children
         self.line = buttons.children[-1]
         self.buttons = {b.description: b for b in buttons.children[:-1]}
@@ -138,11 +138,11 @@ class Pushed:
 
 
 def test_a_push_panel_has_the_words_of_the_table_of_controls(panel):
-    sliders = panel.force, panel.towards, panel.speed
-    for key, slider in zip(("push", "towards", "speed"), sliders, strict=True):
-        assert slider.description == SETTINGS[key].label
-        assert slider.step == SETTINGS[key].step
-    for slider, row in zip(sliders[1:], (SETTINGS["towards"], SETTINGS["speed"]), strict=True):
+    push = SETTINGS["push"].of_weight(panel.sim.robot.weight)
+    rows = [push, *(SETTINGS[key] for key in ("towards", "duration", "speed"))]
+    sliders = panel.force, panel.towards, panel.duration, panel.speed
+    for slider, row in zip(sliders, rows, strict=True):
+        assert (slider.description, slider.step) == (row.label, row.step)
         assert (slider.min, slider.max, slider.value) == (row.low, row.high, row.first)
     shown = {slider.description for slider in sliders} | {*panel.buttons, panel.push.description}
     assert shown == {row.label for row in SETTINGS.values() if "lesson" in row.places}
@@ -177,6 +177,7 @@ def test_a_push_has_the_direction_of_the_handle(panel, force, towards, way, word
 
 
 def test_the_button_pushes_again_and_refuses_a_push_of_zero(panel):
+    panel.force.value = 0.0
     panel.push.click()
     assert panel.line.value == "The push is 0 N. Set the force first."
     assert panel.run.status == "paused"
@@ -207,12 +208,13 @@ def test_dragging_the_robot_sets_the_sliders_and_pushes_each_time(panel):
         until(lambda: panel.arrow is None)
 
 
-def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel):
-    panel.towards.value = 60.0
-    panel.force.value = 600.0
+def test_a_fall_is_reported_and_reset_ends_it(panel):
+    panel.towards.value, panel.duration.value = 60.0, 0.2
+    panel.force.value = 300.0
+    assert panel.line.value == "pushed with 300 N towards 60° for 0.2 s"
     until(lambda: panel.line.value == "fell: press reset, or push again")
     panel.buttons["reset"].click()
-    assert (panel.force.value, panel.towards.value, panel.line.value) == (0.0, 90.0, "running")
+    assert panel.line.value == "running"
     until(lambda: panel.run.sim.time > 0.1 and panel.arrow is None)
     assert panel.run.status == "running"
     panel.buttons["pause"].click()
@@ -222,9 +224,9 @@ def test_a_fall_is_reported_and_reset_moves_the_handle_back(panel):
 
 
 def test_a_push_after_a_fall_starts_the_run_again(panel):
-    told = "pushed with 600 N towards 60° for 0.1 s"
+    told = "pushed with 390 N towards 60° for 0.1 s"
     panel.towards.value = 60.0
-    panel.force.value = 600.0
+    panel.force.value = 390.0
     for _ in range(3):
         until(lambda: panel.line.value == "fell: press reset, or push again")
         panel.push.click()

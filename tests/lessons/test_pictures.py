@@ -153,7 +153,7 @@ def test_a_push_panel_becomes_recorded_runs(view):
     run = live_run(sim, controller, view)
     # the robot of the panel falls
     fb.rollout(sim, controller, 0.6, [fb.Push([0.0, 480.0, 0.0], start=0.0)])
-    data = data_of(push_panel(run, view, max_force=480.0))
+    data = data_of(push_panel(run, view))
     assert [len(control["values"]) for control in data["controls"]] == [5, 4]
     for unpushed in (scene_at(data), scene_at(data, "0,1")):
         assert not any(key[1] == ANIMATION for key in unpushed)

@@ -146,10 +146,12 @@ def test_a_judge_watches_a_robot_whose_stance_changes(title):
     assert judge.message
 
 
-def test_a_push_of_300_n_counts_in_every_direction():
+def test_a_push_of_300_n_counts_in_every_direction_but_not_a_very_short_one():
     judge, session = (BY_TITLE["Survive 300 N"].judge(), Session(GO2))
     record = fb.rollout(session.sim, session.controller, 0.008, control_period=4e-3)
     for angle in np.deg2rad(np.arange(-180.0, 181.0, 5.0)):
         judge.pushes = [fb.Push(300.0 * np.array([np.cos(angle), np.sin(angle), 0.0]))]
         judge.observe(record, session)
         assert judge.message.startswith("Standing")
+    judge.pushes = [fb.Push([300.0, 0.0, 0.0], duration=0.05)]
+    assert judge.largest_push is None

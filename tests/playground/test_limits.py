@@ -23,6 +23,8 @@ def said(settings=None, force=0.0, duration=0.3):
     [
         (Settings(), 0.0, "The robot stands: no foot and no motor is at a limit."),
         (Settings(gait="trot"), 0.0, "walks"),
+        (Settings(com_shift=(0.0, 0.0, -0.08)), 0.0, "stands"),
+        (Settings(assumed_off=("gravity",)), 0.0, "too low"),
         (Settings(torque_fraction=0.12), 0.0, "hip joint"),
         (Settings(friction=(0.3, 0.3)), 90.0, "friction limit"),
         (Settings(friction=(0.7, 0.15)), 60.0, "slipping"),

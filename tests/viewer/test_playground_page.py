@@ -75,7 +75,7 @@ def test_the_push_slider_pushes_when_it_is_released(page, field):
     eventually(page, lambda: field.last_push is not None)
     assert field.last_push.force[1] == field.force > 0.0
     field.last_push = None
-    control(page, "push [N]", "setValue(0)")
+    control(page, "push [N]", "release(0)")
     eventually(page, lambda: field.force == 0.0)
     assert field.last_push is None
 
@@ -186,7 +186,10 @@ def test_a_paused_challenge_continues_with_run(field):
 
 def test_reset_everything_includes_the_push_the_speed_and_the_terms(page, field):
     first = (field.force, field.towards)
-    changes = {"speed [×]": 0.1, "push [N]": 200, "show forces": "false", "show gravity": "true"}
+    changes = {
+        "speed [×]": 0.1, "push [N]": 200, "duration [s]": 0.3, "show forces": "false",
+        "show gravity": "true",
+    }  # fmt: skip
 
     def shown():
         opened(page, field)
@@ -247,9 +250,10 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
     control(page, "facets", "setValue(7)")
     control(page, "lift front left foot", "setValue(true)")
     control(page, "speed [×]", "setValue(0.5)")
-    page.wait_for_function("location.hash == '#lift+front+left+foot=on&facets=7'")
+    hash_is = "text => decodeURIComponent(location.hash) == `#speed+[×]=0.5${text}&facets=7`"
+    page.wait_for_function(hash_is, arg="&lift+front+left+foot=on")
     control(page, "undo", "fire()")
-    page.wait_for_function("location.hash == '#facets=7'")
+    page.wait_for_function(hash_is, arg="")
 
     page.goto("about:blank")
     page.goto(f"{field.url}#friction+μ+reality=0.3&gait=trot&facets=many&nothing=1")
@@ -264,24 +268,32 @@ def test_the_address_has_the_settings_and_sets_them(page, field):
 def test_a_copied_address_opens_the_same_view_and_pushes(page, field):
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     opened(page, field)
+    topple = challenge("The weakest side")
+    control(page, "duration [s]", "setValue(0.2)")
+    control(page, "push [N]", "release(50)")
+    control(page, "challenge", f"setValue({CHALLENGES.index(topple) + 1})")
     control(page, "facets", "setValue(6)")
-    control(page, "push [N]", "setValue(50)")
+    control(page, "towards [°]", "setValue(-45)")
     page.evaluate("viewer.camera.position.set(1.5, 0.8, 1.2)")
     page.locator("#tools summary").click()
     page.locator("#tools button", has_text="copy address").click()
     page.wait_for_function("document.getElementById('tools').textContent.includes('copied')")
     address = page.evaluate("navigator.clipboard.readText()")
-    field.last_push = None
+    field.start_challenge(None)
     page.goto("about:blank")
+    until(lambda: field.challenge is None and field.session.settings == Settings())
+    field.reset_all()
     page.goto(address)
     eventually(page, lambda: field.last_push is not None)
     assert_allclose(field.last_push.force, [0.0, 50.0, 0.0], atol=1e-9)
+    assert field.last_push.duration == 0.2 and field.challenge == topple
+    eventually(page, lambda: (field.force, field.towards, field.duration) == (50.0, -45.0, 0.2))
     assert field.session.settings.facets == 6
     where = page.evaluate("viewer.camera.position.toArray()")
     assert_allclose(where, [1.5, 0.8, 1.2], atol=0.05)  # it follows the robot
 
     page.goto("about:blank")
-    page.goto(f"{field.url}#view=1,2&pushed=50")
+    page.goto(f"{field.url}#view=1,2&pushed=50,90")
     page.wait_for_function("document.getElementById('panel').textContent.includes('6 numbers')")
 
 

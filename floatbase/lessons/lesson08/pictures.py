@@ -19,7 +19,7 @@ from floatbase.behaviours import capture_point, neutral_point, support_margin
 from floatbase.lessons import props
 from floatbase.lessons.lesson06 import region_picture
 from floatbase.lessons.lesson08.helpers import state_with_moved_body
-from floatbase.lessons.panels import Panel, labelled_slider, live_run
+from floatbase.lessons.panels import Panel, live_run, push_sliders
 from floatbase.lessons.slider_samples import recorded_pushes
 from floatbase.simulation import LiveSimulation
 from floatbase.viewer import Picture, Viewer, shapes, status_message
@@ -29,8 +29,8 @@ from floatbase.viewer.scene.colours import GREYS, hex_code
 
 _VERTICAL = np.array([0.0, 0.0, 1.0])
 _SIZES = {"foothold": 0.03, "point": 0.012}  # m: radii of patches on the ground
+_FIRST_PUSH = 200.0  # N
 _PATCH_HEIGHT = 0.003  # m above the ground, so that its lines do not flicker
-_MAX_PUSH = 600.0  # N: the hardest push of the panel
 # N: both withstand the first, only stepping withstands the second; stepping withstands the third to
 # the side only
 _RECORDED_PUSHES = (150.0, 250.0, 350.0)
@@ -137,8 +137,8 @@ class PushComparison(Panel):
             self.views[title].show(sim.state, contacts=sim.feet, cones=False)
             self.runs[title] = live_run(sim, one, self.views[title])
             self.runs[title].on_status(partial(self._tell, title))
-        self.force = labelled_slider("push [N]", 0.0, 200.0, _MAX_PUSH, 10.0)
-        self.towards = labelled_slider("towards [°]", -180.0, 90.0, 180.0, 15.0)
+        self.sliders = push_sliders(next(iter(controllers.values())).robot)
+        self.sliders[0].value = _FIRST_PUSH
         self.push_button = widgets.Button(description="push both")
         self.reset_button = widgets.Button(description="reset")
         self.push_button.on_click(lambda _: self.push())
@@ -153,13 +153,14 @@ class PushComparison(Panel):
         ]
         buttons = widgets.HBox([self.push_button, self.reset_button])
         row = widgets.HBox(columns, layout=widgets.Layout(flex_flow="row wrap"))
-        super().__init__([row, self.force, self.towards, buttons])
+        super().__init__([row, *self.sliders, buttons])
 
     def push(self) -> None:
-        """Push all robots now, for 0.1 s."""
-        push = fb.Push.horizontal(self.force.value, self.towards.value)
+        """Push all robots now."""
+        force, towards, duration = (slider.value for slider in self.sliders)
+        push = fb.Push.horizontal(force, towards)
         for run in self.runs.values():
-            run.push(push.force)
+            run.push(push.force, duration)
 
     def reset(self) -> None:
         """Put all robots back on their feet."""

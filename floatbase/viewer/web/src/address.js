@@ -1,6 +1,5 @@
 // Settings in the page's address, as in #facets=7&gait=trot: the controls that were moved from
-// their first values. Such an address can be kept and shared. Controls at the top of the panel are
-// left out: they push the robot or start a challenge.
+// their first values. Such an address can be kept and shared.
 
 import {kindOf, numberOf} from "./controls.js";
 
@@ -10,8 +9,7 @@ const MOST = 1e4; // of a number of such a key
 const MOST_SHOWN = 40; // characters of a text in a message
 const SWITCHES = new Map([["on", true], ["off", false]]);
 
-export const isKept = (command) =>
-  Boolean(command.term || command.section) && kindOf(command) !== "button";
+export const isKept = (command) => !command.is_hidden && kindOf(command) !== "button";
 
 // The value of a control as a text, and back; undefined for a text that is no value.
 export function textOf({choices}, value) {
@@ -91,8 +89,11 @@ export function createAddress(controls, say) {
       if (refused.has(name)) say([...refused.values()].join(" "));
     },
     changed() { timer ??= setTimeout(write, DELAY); },
-    // The part after # without view and push, which are for one robot.
-    settings: () => writeHash(moved()),
+    // The part after # that another robot understands: without the top of the panel and the view.
+    settings: () => writeHash(moved().filter(([name]) => {
+      const {section, term} = kept.get(name).command;
+      return section || term;
+    })),
     // `count` numbers of a key that is no control, or undefined.
     numbers(key, count) {
       const text = readHash(location.hash).get(key);

@@ -7,6 +7,7 @@ import {beforeRender, findNode, pathNames, three} from "./meshcat.js";
 const LAG = 0.3; // s, delay behind what it follows, so that it does not shake with each step
 const SLOWEST = 1000; // ms, longest time between pictures that counts: at low rates it must keep up
 const WIDE = 1.3; // width / height of a picture that fits a robot; a narrower picture is zoomed out
+const TITLE = 40; // pixels of its first line
 const MIN_ZOOM = 0.2; // in the smallest window
 const MAX_LABEL_SCALE = 1.5; // how much larger labels become when the picture is zoomed out
 const LOW_JUMP = 0.2; // m: the camera stays down if the robot rises by less, however low it stands
@@ -51,9 +52,9 @@ export function followFraction(elapsed) {
   return 1 - Math.exp(-Math.min(elapsed, SLOWEST) / 1000 / LAG);
 }
 
-// The zoom of a picture of width × height pixels.
-export const zoomFor = (width, height) =>
-  Math.max(MIN_ZOOM, Math.min(1, width / height / WIDE));
+// The zoom of a picture of width × height pixels, of which the uppermost `hidden` ones are covered.
+export const zoomFor = (width, height, hidden = 0) =>
+  Math.max(MIN_ZOOM, Math.min(1 - hidden / height, width / height / WIDE));
 
 export const labelScale = (zoom) => Math.min(1 / zoom, MAX_LABEL_SCALE);
 
@@ -63,11 +64,11 @@ export function createCamera(viewer) {
   const gone = new Vector3(), begin = new Vector3(), from = new Vector3();
   let path = [], ground = {planes: [{normal: [0, 1, 0], offset: 0}], boxes: []}, clock = 0;
   let isSmooth = false, isFirst = true;
-  // pixels by which what the camera looks at is above the middle of the picture: the player would
-  // hide the feet, and the terms of an equation would hide the back on a phone
-  const above = () => {
-    const isNarrow = innerWidth < innerHeight;
-    return (element("player").offsetHeight - isNarrow * element("board").offsetHeight) / 2;
+  // pixels at the top of a picture of this width in which the terms of an equation would hide the
+  // head of a robot
+  const hiddenOf = (width) => {
+    const {offsetLeft, offsetWidth, offsetHeight} = element("board");
+    return offsetHeight && offsetLeft + offsetWidth > width / 2 ? TITLE + offsetHeight : 0;
   };
 
   // Follow at a constant height above the ground, and rise with an object that flies away. Returns
@@ -105,13 +106,15 @@ export function createCamera(viewer) {
   beforeRender(viewer, () => {
     const isMoving = path.length > 0 && follow();
     const {clientWidth: w, clientHeight: h} = viewer.renderer.domElement;
-    const zoom = zoomFor(w, h);
+    // the player would hide the feet
+    const hidden = hiddenOf(w), above = (element("player").offsetHeight - hidden) / 2;
+    const zoom = zoomFor(w, h, hidden);
     if (zoom !== viewer.camera.zoom) {
       viewer.camera.zoom = zoom;
       viewer.camera.updateProjectionMatrix();
       scaleLabels(viewer.scene);
     }
-    if (above()) viewer.camera.setViewOffset(w, h, 0, above(), w, h);
+    if (above) viewer.camera.setViewOffset(w, h, 0, above, w, h);
     else viewer.camera.clearViewOffset();
     return isMoving;
   });

@@ -18,7 +18,7 @@ export function pushOf({x, z}, full, most) {
 // {force, towards, at, node}, with the point that was grabbed, y up, and the meshcat node it is in.
 export function createDrag(viewer, {isWanted, most, show, release}) {
   const canvas = viewer.renderer.domElement, newtons = make("output", {className: "newtons"});
-  document.body.append(newtons);
+  element("page").append(newtons);
   let begun = null; // {at, plane, line, node, push} while the robot is dragged
 
   function rayTo({clientX, clientY}) {
@@ -98,21 +98,32 @@ function placeLabel(label, {renderer, camera}, point) {
   label.style.top = `${Math.max(4, (1 - at.y) / 2 * h - 28)}px`;
 }
 
-const FORCE = "push [N]", DIRECTION = "towards [°]";
+const SLIDERS = ["push [N]", "towards [°]", "duration [s]"];
 
-// Dragging the robot sets the sliders "push [N]" and "towards [°]", visible or hidden, where a page
-// has them. Elsewhere it turns the view. controls: those of the panel.
-export const sliderDrag = (controls) => ({
-  isWanted: () => Boolean(controls[FORCE] && controls[DIRECTION]),
-  most: () => controls[FORCE].getMax(),
-  now: () => [controls[FORCE].getValue(), controls[DIRECTION].getValue()],
-  show({force, towards}) {
-    controls[FORCE].show(force);
-    controls[DIRECTION].show(towards);
-  },
-  release(push) {
-    if (push === null) return;
-    controls[DIRECTION].setValue(push.towards);
-    controls[FORCE].setValue(push.force);
-  },
-});
+// Dragging the robot sets the first two sliders, visible or hidden, where a page has them.
+// Elsewhere it turns the view. controls: those of the panel.
+export function sliderDrag(controls) {
+  const sliders = () => SLIDERS.map((name) => controls[name]).filter((one) => one);
+  return {
+    isWanted: () => sliders().length > 1,
+    // Whether a control pushes: the button, or without one the first slider.
+    isPush: (name) => name === (controls.push ? "push" : SLIDERS[0]),
+    most: () => sliders()[0].getMax(),
+    now: () => sliders().map((one) => one.getValue()),
+    show({force, towards}) {
+      [force, towards].forEach((value, i) => sliders()[i].show(value));
+    },
+    release(push) {
+      if (push === null) return;
+      sliders()[1].setValue(push.towards);
+      sliders()[0].release(push.force);
+    },
+    // Push with these values of the sliders, which keep their own.
+    push(values) {
+      const kept = sliders().map((one) => one.getValue());
+      sliders().slice(1).forEach((one, i) => one.setValue(values[i + 1]));
+      sliders()[0].release(values[0]);
+      if (controls.push) sliders().forEach((one, i) => one.setValue(kept[i]));
+    },
+  };
+}

@@ -2,8 +2,8 @@
 //   <script src="…/floatbase-live.js"></script>
 //   <floatbase-robot name="go2" mu="0.6" push="40"></floatbase-robot>
 // The element has the size that the page gives it. What is inside it, such as an image or a
-// recording, is shown until the robot is live, and stays where it cannot be. With the attribute
-// `waits`, the recording is loaded only if the element sends the event `unavailable`.
+// recording, is shown until the robot is live, and stays where it cannot be. Paragraphs go at once.
+// With the attribute `waits`, the recording is loaded only if the element sends `unavailable`.
 
 const HERE = document.currentScript.src;
 const PATIENCE = 20000; // ms until a robot that is not live counts as unavailable
@@ -27,7 +27,7 @@ class FloatbaseRobot extends HTMLElement {
       if (this.hasAttribute(key)) address.searchParams.set(key, this.getAttribute(key));
     }
     if (!this.hasAttribute("panel")) address.searchParams.set("panel", "0");
-    const hasFallback = this.childElementCount > 0;
+    const hasFallback = this.querySelector(":scope > :not(p)") !== null;
     const style = getComputedStyle(this);
     if (style.display === "inline") this.style.display = "block";
     if (style.position === "static") this.style.position = "relative";

@@ -75,12 +75,18 @@ export function createPanel(send) {
     };
     input.setAttribute("aria-label", name);
     remake(command);
+    // Letting go of "push [N]" presses the button "push".
+    const release = (now) => {
+      setValue(now);
+      if (Number(now) > 0) controls[name.replace(/ \[.*/, "")]?.fire?.();
+    };
     input.oninput = () => waits ? show(input.value) : setValue(input.value);
-    if (waits) input.onchange = () => setValue(input.value);
+    if (waits) input.onchange = () => release(input.value);
     input.ondblclick = () => setValue(input.dataset.home);
     if (!command.is_hidden) row(command).append(input, shown);
     return {
-      getValue: () => Number(input.value), getMax: () => Number(input.max), show, setValue, remake,
+      getValue: () => Number(input.value), getMax: () => Number(input.max), show, setValue, release,
+      remake,
     };
   }
   function checkbox(command) {

@@ -90,7 +90,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   const force = given.read("push", numberRule(low, high), numberOf) ?? first;
   const push = {force, towards: rows.towards.first, duration: rows.duration.first};
   const painter = createPainter(scene, drawing, robot);
-  const drawMap = createRecoveryMap(scene.viewer, {
+  const recoveryMap = createRecoveryMap(scene.viewer, {
     size: drawing.size, name, say: (content) => text("map", content),
   });
   const footView = createFootView(scene.viewer, robot, drawing, (foot) => {
@@ -135,7 +135,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     return {pause: isNow};
   };
   const controls = controlsOf(robot, {...settings, gait: firstGait}, push, {
-    names: config.robots, name, walk, shove, draw: painter.show, watch: footView.watch,
+    names: config.robots, name, walk, draw: painter.show, watch: footView.watch,
     open(other) {
       given.texts.set("name", other);
       location.assign(`?${given.texts}${scene.address.settings()}`);
@@ -157,12 +157,13 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
         scene.handle({...command, type: "set_control_value"});
       }
       pushed = null;
+      recoveryMap.clear();
       return {...pause(false), resetAll: true};
     },
     map() {
       if (frame === null) return;
       const {settings: present, com} = frame;
-      drawMap(present, settingsText(controls, present, settings), com);
+      recoveryMap.start(present, settingsText(controls, present, settings), com);
     },
   };
   const presses = new Map(Object.entries(buttons).map(([key, press]) => [rows[key].name, press]));
@@ -180,7 +181,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
       scene.handle({type: "set_text", path: "", name: "explained", text: content, section});
     }
   }
-  else document.body.append(pushButton());
+  else element("page").append(pushButton());
   if (hasPanel && innerWidth < ROOMY) scene.foldPanel(true);
   scene.handle({type: "set_legend", path: "", items: drawing.legend});
 
@@ -193,6 +194,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   }
   const tell = createVoice((text) => {
     scene.handle({type: "set_title", path: "", text});
+    element("title").title = frame?.conflict.length ? conflictLines(frame.conflict) : "";
     parent.postMessage({floatbase: "limit", text}, "*");
   });
   createDrag(scene.viewer, {
@@ -275,10 +277,10 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   worker.onmessage = ({data}) => {
     if (data.frame) {
       isWaiting = false;
+      if (data.hasNews) showSettings(data.frame.settings);
       draw(data.frame);
       if (!isLive) announce();
     }
-    if (data.settings) showSettings(data.settings);
     if (data.stoodUp) tell(STOOD_UP, performance.now());
     if (data.isRefusal) refuse(data.error);
     else if (data.error) showNotice(data.error);
@@ -312,7 +314,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   }
   addEventListener("message", ({data, source}) => {
     if (source !== parent || data?.floatbaseSet === undefined) return;
-    send({set: data.floatbaseSet});
+    send({set: data.floatbaseSet, show: true});
   });
   window.floatbaseLive = {send, frame: () => frame}; // for programs that control the page
   (function loop() {

@@ -26,8 +26,9 @@ export function createScene(config) {
   const player = createPlayer(viewer);
   let moreOfAddress = () => ({}); // {key: numbers} of what a page knows beside its controls
   const panel = createPanel((message) => {
-    if (config.mode === "live" && sliders.isWanted() && message.name.startsWith("push")) {
-      moreOfAddress = () => ({pushed: sliders.now()});
+    if (config.mode === "live" && sliders.isWanted()) {
+      const pushed = sliders.isPush(message.name) ? sliders.now() : undefined;
+      if (pushed || message.name === "reset everything") moreOfAddress = () => ({pushed});
     }
     send(message);
     address?.changed();
@@ -106,9 +107,9 @@ export function createScene(config) {
     },
     // Push by the sliders as the address says, if it does.
     pushAsAddressed() {
-      const [force, towards] = address.numbers("pushed", 2) ?? [];
-      if (force === undefined || !sliders.isWanted()) return;
-      setTimeout(() => sliders.release({force, towards}), PUSHED_AFTER);
+      if (!sliders.isWanted()) return;
+      const values = address.numbers("pushed", sliders.now().length);
+      if (values) setTimeout(() => sliders.push(values), PUSHED_AFTER);
     },
     handle: (command) => viewer.handle_command(command),
     fit: () => viewer.set_3d_pane_size(),

@@ -71,6 +71,7 @@ export function createTheme(viewer, {backgrounds, shades: codes}) {
   function paintBackground() {
     const [top, bottom] = backgrounds[dark ? "dark" : name];
     const parts = (code) => toChannels(toNumber(code)).map((channel) => channel / 255);
+    viewer.scene.background?.dispose?.(); // meshcat makes another one
     viewer.set_property(["Background"], "top_color", parts(top));
     viewer.set_property(["Background"], "bottom_color", parts(bottom));
   }

@@ -40,6 +40,7 @@ test("the camera follows alike at any rate of pictures", () => {
 test("a picture is smaller in a narrow window, never larger", () => {
   assert.equal(zoomFor(1600, 600), 1);
   assert.ok(zoomFor(600, 600) < 1);
+  assert.ok(zoomFor(1600, 600, 100) < 1);
   assert.ok(zoomFor(500, 600) < zoomFor(600, 600));
   assert.equal(zoomFor(10, 2000), 0.2);
 });

@@ -14,7 +14,7 @@ import {controlsOf, labelOf} from "../src/live/controls.js";
 import {footText, nearestFacet, polygon} from "../src/live/foot_view.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
-import {deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
+import {briefly, deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
 import {
   conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
 } from "../src/live/words.js";
@@ -124,7 +124,7 @@ test("the sentence names what limits the robot, the most important first", () =>
   const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
     ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
   assert.match(text({outcome: "infeasible", conflict}),
-    /friction of the front left foot; torque limit of the rear left calf joint and rear left hip/);
+    /friction of the front left foot, torque limit of the rear left calf joint and 1 more\./);
   assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
 });
 
@@ -132,6 +132,12 @@ test("parts have names that a reader knows", () => {
   assert.equal(footName("HR_FOOT"), "rear right foot");
   assert.equal(footName("left_sole_link corner 1"), "left foot");
   assert.equal(jointName("RL_thigh_joint"), "rear left thigh joint");
+});
+
+test("the label of a map has few settings", () => {
+  assert.equal(briefly("standing, facets 8, CoM x [cm] 2"), "standing, facets 8, CoM x [cm] 2");
+  assert.equal(briefly("trot, 0.3 m/s, facets 8, CoM x [cm] 2, CoM y [cm] 1"),
+    "trot, 0.3 m/s, facets 8 and 2 more");
 });
 
 test("a sentence stays long enough to be read, and a more important one waits for its turn", () => {
@@ -163,7 +169,7 @@ test("controls begin at the settings of the engine and change what they name", (
   const chosen = [], drawn = [];
   const made = Object.fromEntries(controlsOf({...data, lifted: ["FL_foot"]}, settings, push, {
     names: ["go2"], name: "go2", open() {}, walk: (gait) => { chosen.push(gait); },
-    shove: () => ({push: push.force}), draw: (...term) => { drawn.push(term); },
+    draw: (...term) => { drawn.push(term); },
   }).map((control) => [control.command.name, control]));
   for (const {command, shown} of Object.values(made)) {
     if (shown) assert.equal(command.value, shown(settings));
@@ -180,9 +186,8 @@ test("controls begin at the settings of the engine and change what they name", (
     assert.deepEqual(change(min), {set: {[setting]: 0.01 * min}});
     assert.ok(min < max);
   }
-  assert.deepEqual(made["push [N]"].change(55), {push: 55});
-  assert.equal(made["push [N]"].change(0), undefined);
-  assert.equal(push.force, 0);
+  assert.equal(made["push [N]"].change(55), undefined); // the button pushes
+  assert.equal(push.force, 55);
   assert.deepEqual(made.facets.change(1), {set: {facets: 8}});
   assert.deepEqual(made.lift.change(1), {set: {lifted: "FL_foot"}});
   made.gait.change(1);
@@ -251,12 +256,27 @@ test("a judge names what must not be changed in the words of the controls", () =
   for (const text of said) assert.doesNotMatch(text, /_|Off/);
 });
 
+test("a very short push is no large one, but it is a push", () => {
+  const judges = Object.fromEntries(challenges.map((challenge) => (
+    [challenge.judge, createJudge(challenge, defaults(go2))])));
+  const sample = {time: 0, span: 1, feet: [], facets: []};
+  for (const duration of [0.05, 0.1]) {
+    for (const name of ["survive", "topple"]) {
+      judges[name].push({force: [300, 0, 0], duration});
+      judges[name].observe(sample, defaults(go2));
+    }
+    const said = judges.survive.status.message;
+    assert.match(said, duration < 0.1 ? /^Push the robot/ : /^Standing/);
+  }
+  assert.match(judges.topple.status.message, /more than one push/);
+});
+
 test("both ends of every control are valid settings, and what is beyond them is refused", () => {
   checkSettings(defaults(go2), go2);
   const push = {force: 30, towards: 90, duration: 0.1}, page = {...go2, lifted: ["FL_foot"],
     legs: Object.keys(go2.legs), points: Object.keys(go2.legs), gaits: go2.walking.gaits};
   const made = controlsOf(page, defaults(go2), push, {
-    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}), shove() {},
+    names: ["go2"], name: "go2", open() {}, walk: (gait) => ({set: {gait}}),
     draw() {}, watch() {},
   });
   const names = made.map(({command: {name, column = ""}}) => name.replace(column, "").trim());

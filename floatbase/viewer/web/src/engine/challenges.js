@@ -12,11 +12,12 @@ const PAGE_SETTINGS = {
   com_shift: ["forward", "left", "height"], lifted_feet: ["lifted"], gait: ["gait"],
   torque_fraction: ["torque"],
 };
-const PUSH_TIME = 0.1; // s: a shorter push does not count, since those of the playground last so
 const ONE_PUSH_ONLY = "That was more than one push. Reset, and push only once.";
 
 const sizeOf = ({force}) => Math.hypot(...force);
-const largest = (pushes) => pushes.length ? Math.max(...pushes.map(sizeOf)) : null;
+// The largest force of a push, without very short ones; null before the first.
+const largest = (pushes) => pushes.filter(({duration}) => duration >= limits.push_time)
+  .reduce((most, push) => Math.max(most, sizeOf(push)), null);
 
 // Functions watch(sample, memory, held): true when the challenge is solved, otherwise its status.
 // held(holds): for how long a condition has held without interruption, s.
@@ -126,7 +127,7 @@ export function createJudge({judge, text, locked, locked_actual: actual = []}, s
   }
   return {
     get status() { return {text, message, isWon}; },
-    push(push) { if (push.duration >= PUSH_TIME) pushes.push(push); },
+    push(push) { pushes.push(push); },
     // sample: see `sampleOf`. settings: present ones.
     observe(sample, settings) {
       const verdict = WATCHES[judge]({...sample, pushes}, memory,

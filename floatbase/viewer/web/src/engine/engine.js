@@ -230,13 +230,12 @@ export function createEngine(mj, module, robot) {
     }
     pushes = pushes.filter(({start, duration}) => start + duration > time);
   }
-  // The height of the base as a fraction of its height in a standing robot.
-  const heightNow = () => actual.data.xpos[3 * base + 2] / startHeight;
-  const isAirborne = () => heightNow() > AIRBORNE;
+  const baseHeight = () => actual.data.xpos[3 * base + 2];
+  const isAirborne = () => baseHeight() > AIRBORNE * startHeight;
   function isFallen() {
     const {xmat} = actual.data;
     const axis = [2, 5, 8].reduce((sum, at, i) => sum + xmat[9 * base + at] * startAxis[i], 0);
-    return heightNow() < robot.fallenHeight || axis < robot.fallenCosine;
+    return baseHeight() < robot.fallenHeight * startHeight || axis < robot.fallenCosine;
   }
 
   reset();
@@ -296,7 +295,8 @@ export function createEngine(mj, module, robot) {
       mj.mj_subtreeVel(actual.model, actual.data);
       return [...actual.data.subtree_linvel.subarray(3 * base, 3 * base + 3)];
     },
-    height: heightNow,
+    // The height of the base as a fraction of the wanted one.
+    height: () => baseHeight() / (startHeight + settings.height),
     com: () => [...actual.data.subtree_com.subarray(3 * base, 3 * base + 3)],
     measuredForces: () => contactForces(mj, actual, robot, buffer, adhesion()),
     // Planned forces of all contact points, zero for those of a lifted foot.

@@ -1,10 +1,10 @@
 // The worker of a page with a live robot: it holds the engine, and steps it when the page asks for
 // a picture. A page that draws nothing lets the robot rest.
 //
-// From the page: {start}, {begin}, {set}, {undo}, {resetAll}, {challenge}, {foot}, {push}, {reset},
-// {pause}, {step}, {timeScale}, {frame}, {recovery}; to the page: {ready}, {frame}, {stoodUp},
-// {settings}, {recovery}, {error}. {settings} are those that the page did not set itself. An error
-// with `isRefusal` says why a message makes no sense; then nothing has changed.
+// From the page: {start}, {begin}, {set}, {show}, {undo}, {resetAll}, {challenge}, {foot}, {push},
+// {reset}, {pause}, {step}, {timeScale}, {frame}, {recovery}; to the page: {ready}, {frame},
+// {stoodUp}, {recovery}, {error}. A frame with `hasNews` has settings that the page's controls did
+// not set. An error with `isRefusal` says why a message makes no sense; then nothing has changed.
 
 import {challenges, createJudge, sampleOf, startOf} from "./challenges.js";
 import {createClock} from "./clock.js";
@@ -24,6 +24,7 @@ const clock = createClock(STEP), history = createHistory();
 let home = null; // the settings that the page began with
 let first = null; // the settings of "reset everything": those, or those of a challenge
 let challenge = null, judge = null; // what is to be solved, or null, and who watches
+let hasNews = false; // of settings that the page's controls did not set
 let foot = null; // the contact point whose force the page explains
 let motion = null; // of the centre of mass at the last picture: {time, velocity, acceleration}
 // constraints that were active, and contact points that slipped, in the steps of the last picture
@@ -122,7 +123,8 @@ function frame() {
   }
   if (done % SAMPLE > 0) watch(done % SAMPLE); // a picture in slow motion has few steps
   clock.done(done, performance.now() - begin);
-  postMessage({frame: picture()});
+  postMessage({frame: picture(), hasNews});
+  hasNews = false;
 }
 
 function watch(steps) {
@@ -199,14 +201,15 @@ const handlers = {
     const before = engine && history.undo(engine.settings);
     if (!before) return;
     engine.set(before);
-    postMessage({settings: engine.settings});
+    hasNews = true;
   },
+  show(isWanted) { hasNews ||= isWanted; },
   resetAll() {
     if (!engine) return;
     change(first);
     restart();
     clock.setScale(1);
-    postMessage({settings: engine.settings});
+    hasNews = true;
   },
   push(push) {
     engine?.push(push);
@@ -224,7 +227,7 @@ const handlers = {
     first = challenge ? {...defaults(robot), ...startOf(challenge)} : home;
     history.clear();
     restart(first);
-    postMessage({settings: engine.settings});
+    hasNews = true;
   },
   reset: () => engine && restart(),
   pause(isPaused) {

@@ -11,7 +11,6 @@ const SIDES = { // texts on the switches of a term
 const NO_ARROWS = "This page draws no arrows for this term. The playground does.";
 const CHALLENGED = "go2"; // the robot with challenges, as in the playground
 const titles = challenges.map(({title}) => title);
-export const SHOWN_AT_FIRST = ["forces", "cones"]; // terms
 
 // The text of a control, such as "CoM x [cm]". row: of the table of settings.
 export const labelOf = ({name, symbol = "", unit = ""}) => (
@@ -35,9 +34,9 @@ export function settingsText(controls, settings, first) {
 // the worker: {set}, {timeScale} and others. shown returns the value for settings of the engine; it
 // is null for a control of something else. push: {force, towards, duration}, changed in place.
 // open: called with another robot's name. walk: called with the name of a gait, or null to stand.
-// shove(): returns the message that pushes the robot. draw: called with a term of eq. (7), and
-// whether to draw it. watch: called with the name of a contact point, or null.
-export function controlsOf(robot, settings, push, {names, name, open, walk, shove, draw, watch}) {
+// draw: called with a term of eq. (7), and whether to draw it. watch: called with the name of a
+// contact point, or null.
+export function controlsOf(robot, settings, push, {names, name, open, walk, draw, watch}) {
   const control = (label, command, change, shown = null) => {
     const present = shown ? {value: shown(settings)} : {};
     return {
@@ -73,10 +72,9 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, shov
       return !now[setting].includes(term.name);
     });
   const board = terms.flatMap((term) => {
-    const isDrawn = term.page_arrow || SHOWN_AT_FIRST.includes(term.name);
+    const {is_shown: isShown = false} = term, isDrawn = term.page_arrow || isShown;
     const command = {
-      term: term.symbol, part: "shown", value: SHOWN_AT_FIRST.includes(term.name),
-      disabled: !isDrawn,
+      term: term.symbol, part: "shown", value: isShown, disabled: !isDrawn,
       description: isDrawn ? `show ${term.arrow ?? term.name}` : `${term.arrow}. ${NO_ARROWS}`,
     };
     const switches = Object.entries(SIDES).filter(([side]) => term[`${side}_switch`])
@@ -86,10 +84,7 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, shov
 
   const gaits = Object.keys(robot.gaits);
   return [
-    ranged("push", "", {value: push.force, on_release: true}, (value) => {
-      push.force = value;
-      return value > 0 ? shove() : undefined;
-    }),
+    ranged("push", "", {value: push.force, on_release: true}, (value) => { push.force = value; }),
     ranged("towards", "", {value: push.towards}, (value) => { push.towards = value; }),
     ranged("duration", "", {value: push.duration}, (value) => { push.duration = value; }),
     ranged("speed", "", {value: rows.speed.first}, (value) => ({timeScale: value})),

@@ -1,7 +1,7 @@
 // The force at one contact point from above: inside the polygon that the controller plans with, and
 // what more friction would bring. Forwards is up, left is left.
 
-import {make} from "../dom.js";
+import {element, make} from "../dom.js";
 import {pointName} from "./words.js";
 
 const NEAR = 40; // pixels between the pointer and a foot that it points at
@@ -57,7 +57,7 @@ export function createFootView(viewer, robot, drawing, choose) {
   const close = make("button", {type: "button", textContent: "×", title: "close"});
   close.setAttribute("aria-label", "close");
   const box = make("div", {className: "foot", hidden: true}, title, close, picture, scale, text);
-  document.body.append(box);
+  element("page").append(box);
   close.onclick = () => watch(null);
   let watched = null, frame = null;
   function watch(name) {

@@ -1,7 +1,7 @@
 // Draws a live robot: it moves, colours, shows and hides the items of its scene.
 
 import {cross} from "../engine/dynamics.js";
-import {SHOWN_AT_FIRST} from "./controls.js";
+import {terms} from "../engine/settings.js";
 
 // m: matrix of an arrow from `start` along `vector`, column by column. wide: factor of its width.
 export function arrowMatrix(start, vector, {size, slenderness, arrowLength}, wide = 1) {
@@ -40,7 +40,7 @@ export function createPainter(scene, drawing, robot) {
     scene.handle({type: "set_property", path: path(item), property, value});
   }
   const {links, points, scale, coneHeight, patchRadius, leastForce} = drawing;
-  const shown = new Set(SHOWN_AT_FIRST); // terms of eq. (7)
+  const shown = new Set(terms.filter((term) => term.is_shown).map(({name}) => name)); // of eq. (7)
 
   function drawLinks({rotations: R, positions: p}) {
     for (const [joint, item] of links) {

@@ -9,6 +9,7 @@ const DIRECTIONS = 16, DURATION = 0.1, RESOLUTION = 5; // -, s, N: those of `fb.
 const FEWEST_WORKERS = 2, MOST_WORKERS = 4;
 const HEIGHT = 0.004; // m above the ground
 const NOW = 0x0072b2, BEFORE = 0x777777, RING = 0xbbbbbb;
+const MOST_PARTS = 3; // of the settings on a label
 const MOST_RINGS = 4, CORNERS = 64; // of a circle
 const LETTERS = 0.08; // height of a label, times the robot's size
 const RADIUS = 0.75; // of the largest push, times the robot's size: it fits the picture
@@ -45,6 +46,12 @@ export function ringsFor(most) {
   const power = 10 ** Math.floor(Math.log10(most / MOST_RINGS));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power * MOST_RINGS >= most);
   return Array.from({length: Math.floor(most / step)}, (_, i) => (i + 1) * step);
+}
+
+// "trot, 0.30 m/s, facets 8 and 3 more": settings on a label, which must fit the picture.
+export function briefly(what) {
+  const parts = what.split(", "), more = parts.length - MOST_PARTS;
+  return more > 0 ? `${parts.slice(0, MOST_PARTS).join(", ")} and ${more} more` : what;
 }
 
 // The extremes of a map in words. what: such as "trot, 0.30 m/s".
@@ -126,7 +133,7 @@ export function createRecoveryMap(viewer, {size, name, say}) {
       const colour = i ? BEFORE : NOW, points = outline(found, centre, scale,
         found.length === DIRECTIONS), away = centre[1] + (1.15 + 0.45 * i) * RADIUS * size;
       if (found.length > 2) drawn.push(line(colour, points), area(colour, points, centre));
-      drawn.push(label(`largest push survived: ${what}`, [centre[0], away, HEIGHT],
+      drawn.push(label(`largest push survived: ${briefly(what)}`, [centre[0], away, HEIGHT],
         toCode(colour)));
     });
     for (const one of drawn) viewer.scene.add(one);
@@ -140,11 +147,20 @@ export function createRecoveryMap(viewer, {size, name, say}) {
     end();
     say(`The push-recovery map stopped: ${reason}. Press the button to start it again.`);
   }
+  // Remove the maps.
+  function clear() {
+    end();
+    drawn.forEach(remove);
+    maps.length = drawn.length = 0;
+    say("");
+    viewer.set_dirty();
+  }
   // settings: those of the page. what: what is special about them. centre: below the robot, [x, y].
-  return function start(settings, what, centre) {
+  function start(settings, what, centre) {
     end();
     const mine = {found: [], what, centre}, begun = performance.now();
     maps.splice(1);
+    if (maps[0]?.what === what) maps.shift(); // the same again
     maps.unshift(mine);
     const free = (navigator.hardwareConcurrency || 2) - 1; // one core draws
     const count = Math.max(FEWEST_WORKERS, Math.min(MOST_WORKERS, free));
@@ -165,5 +181,6 @@ export function createRecoveryMap(viewer, {size, name, say}) {
       }});
       return worker;
     });
-  };
+  }
+  return {start, clear};
 }

@@ -1,18 +1,17 @@
 // Sentences about the live robot: what limits it now.
 
 import {isInAir} from "../engine/contacts.js";
+import table from "../../../../live/limits.json" with {type: "json"};
 
-const SIDES = {L: "left", R: "right"}, ENDS = {F: "front", R: "rear", H: "rear"};
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
-const MOST_NAMES = 2; // in a sentence
+const MOST_CONFLICTS = 2; // in a sentence
 const IN_AIR = 1; // rank of the sentence about flight, which is no limit
-const LOW = 0.75; // of its height: a lower robot does not stand
-const CALM = 7; // rank of a sentence that names no limit
+const CALM = table.limits.length + 2; // rank of a sentence that names no limit
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
 export function footName(name) {
   const [, end, side] = /^([FRH])([LR])_/i.exec(name) ?? [];
-  if (end) return `${ENDS[end.toUpperCase()]} ${SIDES[side.toUpperCase()]} foot`;
+  if (end) return `${table.ends[end.toUpperCase()]} ${table.sides[side.toUpperCase()]} foot`;
   const [human] = /left|right/.exec(name) ?? [];
   return human ? `${human} foot` : name;
 }
@@ -26,22 +25,14 @@ export function pointName(name) {
 // "FL_calf_joint" -> "front left calf joint", "leg_left_4_joint" -> "leg left 4 joint".
 export function jointName(name) {
   const [, end, side, rest] = /^([FRH])([LR])_(.+?)(?:_joint)?$/.exec(name) ?? [];
-  return end ? `${ENDS[end]} ${SIDES[side]} ${rest.toLowerCase()} joint`
+  return end ? `${table.ends[end]} ${table.sides[side]} ${rest.toLowerCase()} joint`
     : name.replaceAll("_", " ");
 }
 
-function list(names) {
-  const unique = [...new Set(names)];
-  if (unique.length > MOST_NAMES) {
-    return `${unique.slice(0, MOST_NAMES).join(", ")} and ${unique.length - MOST_NAMES} more`;
-  }
-  return unique.join(" and ");
-}
-
-// "The front left foot is", "The front left foot and the rear left foot are".
-function subject(names) {
-  const unique = [...new Set(names)].map((name) => `the ${name}`), text = list(unique);
-  return `${text[0].toUpperCase()}${text.slice(1)} ${unique.length > 1 ? "are" : "is"}`;
+// "A", "A and B", "A, B and 3 more": at most `most` names.
+function list(names, most = table.most_names) {
+  const more = names.length - most;
+  return more > 0 ? `${names.slice(0, most).join(", ")} and ${more} more` : names.join(" and ");
 }
 
 const STOPPED = {
@@ -51,17 +42,14 @@ const STOPPED = {
     "has a slower method for it. The robot will be back on its feet in a moment.",
 };
 
-const kindOf = ([kind]) => kind.replace(/^(upper|lower) /, "");
 const ownerOf = ([kind, owner]) => (kind.includes("joint") || kind.includes("torque")
   ? jointName(owner) : footName(owner));
 
 // What stopped a controller without an answer. conflict: [kind, owner, number], see what_if.js.
 function conflictText(conflict) {
-  const kinds = [...new Set(conflict.map(kindOf))].map((kind) => {
-    const owners = conflict.filter((one) => kindOf(one) === kind).map(ownerOf);
-    return `${kind} of the ${list(owners)}`;
-  });
-  return `These constraints cannot hold together: ${kinds.join("; ")}. ` +
+  const all = conflict.map((one) => (
+    `${one[0].replace(/^(upper|lower) /, "")} of the ${ownerOf(one)}`));
+  return `These constraints cannot hold together: ${list([...new Set(all)], MOST_CONFLICTS)}. ` +
     "The robot will be back on its feet in a moment.";
 }
 
@@ -71,7 +59,7 @@ export function conflictLines(conflict) {
     const those = conflict.filter((one) => one[0] === kind);
     const names = those.map((one) => (
       kind === "friction" ? `${ownerOf(one)} (facet ${one[2] + 1})` : ownerOf(one)));
-    return `${those.length} × ${kind}: ${names.join(", ")}`;
+    return `${those.length} × ${kind}: ${[...new Set(names)].join(", ")}`;
   });
   return ["In conflict. Without any one of these constraints, the others can hold:", ...kinds]
     .join("\n");
@@ -86,45 +74,25 @@ export function limitOf(frame, robot, before = "") {
     const reason = slipped || frame.conflict.length || !before ? "" : `\nJust before: ${before}`;
     return {rank: 0, text: slipped + (text ?? frame.outcome) + reason};
   }
-  if (isInAir(frame, robot)) {
-    return {rank: IN_AIR, text: "The robot is in the air: the ground exerts no force on its feet."};
-  }
-  const slipping = frame.slipping.map(footName);
-  if (slipping.length) {
-    return {rank: 2, text: `${subject(slipping)} slipping: the ground gives less friction than ` +
-      "the controller plans with."};
-  }
+  if (isInAir(frame, robot)) return {rank: IN_AIR, text: table.air};
   const owners = (part) => frame.seen
     .filter(([kind, , , multiplier]) => kind.endsWith(part) && multiplier > WEAK)
     .filter(([kind]) => kind !== "largest normal force") // before a foot lifts off
     .map(([, owner]) => owner);
-  const motors = owners("torque limit").map(jointName);
-  if (motors.length) {
-    const many = new Set(motors).size > 1;
-    return {rank: 3, text: `${subject(motors)} at ${many ? "their torque limits" :
-      "its torque limit"}.`};
+  const unloaded = owners("normal force").map(footName);
+  const found = {
+    slipping: frame.slipping.map(footName), torque: owners("torque limit").map(jointName), unloaded,
+    friction: owners("friction").map(footName).filter((name) => !unloaded.includes(name)),
+    range: owners("joint limit").filter((name) => !robot.resting.includes(name)).map(jointName),
+  };
+  const rank = table.limits.findIndex(([key]) => found[key].length);
+  if (rank < 0) {
+    const state = frame.settings.gait ? "walks" : "stands";
+    return {rank: CALM, text: table[frame.height < table.low_height ? "low" : state]};
   }
-  const unloaded = new Set(owners("normal force").map(footName));
-  const gripping = owners("friction").map(footName).filter((name) => !unloaded.has(name));
-  if (gripping.length) {
-    const many = new Set(gripping).size > 1;
-    return {rank: 4, text: `${subject(gripping)} at ${many ? "their friction limits" :
-      "its friction limit"}.`};
-  }
-  if (unloaded.size) {
-    return {rank: 5, text: `${subject([...unloaded])} unloaded: a foot can push on the ground, ` +
-      "but not pull."};
-  }
-  const joints = owners("joint limit").filter((name) => !robot.resting.includes(name))
-    .map(jointName);
-  if (joints.length) {
-    const many = new Set(joints).size > 1;
-    return {rank: 6, text: `${subject(joints)} near the end of ${many ? "their ranges" :
-      "its range"}.`};
-  }
-  const calm = frame.height < LOW ? "The robot is too low" : frame.settings.gait
-    ? "The robot walks" : "The robot stands";
-  return {rank: CALM, text: `${calm}: no foot and no motor is at a limit.`};
+  const [key, one, several] = table.limits[rank], names = [...new Set(found[key])];
+  const subject = `The ${list(names.map((name, i) => (i ? `the ${name}` : name)))}`;
+  return {rank: rank + 2, text: `${subject} ${names.length > 1 ? several : one}`};
 }
 
 export const isLimit = ({rank}) => rank > IN_AIR && rank < CALM;
