@@ -182,7 +182,7 @@ class HydraulicActuators:
 
         The joints are constant during the step, and the resulting torques act on the next one. With
         the spring of the oil, this is stable (symplectic Euler) for √(L² k / inertia) dt < 2. At 1
-        ms the robots of the catalogue reach 1.7.
+        ms the robots in the catalogue reach 1.7.
 
         Parameters
         ----------
