@@ -25,6 +25,7 @@ import pytest
 from values import UP, controller, record, values
 
 import floatbase as fb
+from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
 from floatbase.errors import FloatbaseError, InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import qp_plots
@@ -135,6 +136,9 @@ def right():
         "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": up, "npt.ArrayLike": up, "a": 10.0, "alpha": 0.1, "rate": 30.0, "omega": 5.0,
         "N": np.eye(12)[:, :3],
+        "Delay": Delay(robot, 0.01), "FirstOrderLag": FirstOrderLag(robot, 5.0),
+        "HydraulicActuators": HydraulicActuators(robot), "dt": 1e-3,
+        "tau_desired": x, "q_joints": state.q[7:], "v_joints": x,
         "x": x, "tau": x, "beta": x, "max_lever_angle": x, "scale": np.ones(12),
         "q": state.q, "v": state.v, "dv": np.zeros(18), "qdd": np.zeros(18),
         "Q": state.q[None], "V": state.v[None],
@@ -177,7 +181,7 @@ NOT_CALLED = """
 
 WITH_METHODS = """
     Robot State Contacts EquationsOfMotion FeasibleSpace WholeBodyController
-    Affine Quadratic FrictionCone FrictionPolyhedron Gait
+    Affine Quadratic FrictionCone FrictionPolyhedron Gait Delay FirstOrderLag HydraulicActuators
 """
 
 
