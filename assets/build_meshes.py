@@ -1,4 +1,4 @@
-"""Build the light meshes of the catalogue's robots: `python assets/build_meshes.py [robot …]`.
+"""Build the light meshes of the robots in the catalogue: `python assets/build_meshes.py [robot …]`.
 
 Needs the packages trimesh, pycollada and fast-simplification. Reading the result needs only numpy.
 

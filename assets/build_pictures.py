@@ -1,7 +1,7 @@
 """Make the pictures of `assets/pictures/`: `python assets/build_pictures.py [name …]`. Needs
 playwright and a Chromium.
 
-They show the course text's figures, every robot of the catalogue with its forces and friction
+They show the course text's figures, every robot in the catalogue with its forces and friction
 cones, go2 with four-sided cones, and the feet of talos. The animation shows go2 stepping after a
 push; it also needs the extra `video`. So does `docs/priorities.png`, which shows weighted tasks
 beside strict priorities.

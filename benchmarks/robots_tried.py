@@ -8,7 +8,7 @@ robots_tried.toml lists the files, with the arguments that a file needs. Nothing
 packages that are not installed are named in the page.
 
 Robot files of packages on PyPI, none of them made for floatbase, were loaded and tried by
-`python benchmarks/robots_tried.py`, which wrote this page. Robots of the catalogue and of
+`python benchmarks/robots_tried.py`, which wrote this page. Robots in the catalogue and of
 example-robot-data are not listed. See [Your own robot](your_own_robot.md).
 
 - **arguments** is what `fb.load_urdf` or `fb.load_mjcf` needs besides the path. With none, a robot

@@ -17,7 +17,6 @@ from harness import tilt, velocity
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Stand, Walk
-from floatbase.robots import Foot
 from floatbase.simulation import Rollout
 
 SEED = 0
@@ -203,17 +202,6 @@ def recovered(name: str, low: float, high: float, gait: Callable[[fb.Robot], Gai
     return what, found, f"steps ≥ {enough}, none lost", stepped >= enough and lost == 0
 
 
-def turned(yaw_rate: float) -> Row:
-    run, _ = walked("go2", Gait.trot, 0.2, 7.0, period=2e-3, yaw_rate=yaw_rate)
-    rows = run.time > 4.0
-    x, y = run.com[rows, :2].T
-    A = np.column_stack([2.0 * x, 2.0 * y, np.ones(rows.sum())])
-    *centre, c = np.linalg.lstsq(A, x**2 + y**2, rcond=None)[0]
-    v = yaw_rate * np.sqrt(c + np.square(centre).sum())
-    what = f"go2: 0.2 m/s and {yaw_rate:g} rad/s (2 ms)"
-    return judged(what, run, near("{:.4f} m/s", v, 0.2, 0.03))
-
-
 def gait_walked(name: str, gait: str, mu: float) -> Row:
     robot = fb.load(name)
     made, what = getattr(Gait, gait)(robot), f"{name}: {gait} 0.2 m/s, friction {mu:g} (2 ms)"
@@ -225,51 +213,6 @@ def gait_walked(name: str, gait: str, mu: float) -> Row:
     whole_periods = made.period * np.floor(2.0 / made.period)
     speed = near("{:.3f} m/s", velocity(run, 4.99 - whole_periods, 4.99)[0], 0.2, 0.1)
     return judged(what, run, speed, most("tilt {:.1f}°", tilt(run), 2.0, "°"))
-
-
-def bolt_walked() -> Row:
-    robot = fb.load("bolt", feet=[Foot("FL_FOOT"), Foot("FR_FOOT")])
-    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), Gait.walk(robot))
-    run = fb.rollout(fb.Simulation(robot), walk, 4.0, control_period=2e-3)
-    drift = most("{:.0f} mm", 1e3 * np.linalg.norm(run.com[-1, :2]), 200.0)
-    return judged("bolt: on the spot 4 s (2 ms)", run, drift)
-
-
-def sloped(degrees: float, known: bool) -> Row:
-    robot, angle = fb.load("talos"), np.deg2rad(degrees)
-    normal = np.array([-np.sin(angle), 0.0, np.cos(angle)])
-    contacts = fb.Contacts.feet(robot, mu=0.6, normals=normal)
-    ground = fb.Ground(normal=normal)
-    known_ground = ground if known else None
-    walk = Walk(robot, contacts, Gait.walk(robot), (0.2, 0.0), ground=known_ground)
-    run = fb.rollout(fb.Simulation(robot, ground), walk, 5.0, (), 2e-3)
-    slide = 1e3 * run.slip(include_rolling=False).max()
-    what = f"talos: slope of {degrees:g}°, {'known' if known else 'blind'} (2 ms)"
-    return judged(what, run, most("slides {:.1f} mm a stance", slide, 2.0 if known else 40.0))
-
-
-def hand_held() -> Row:
-    robot, frame, rate = fb.load("anymal_kinova"), "j2s6s200_end_effector", 2.0
-    start = robot.standing().point(frame)
-
-    def circle(t: float) -> tuple[np.ndarray, ...]:
-        c, s = 0.1 * np.cos(rate * t), 0.1 * np.sin(rate * t)
-        velocity, acceleration = rate * np.array([0, c, -s]), -(rate**2) * np.array([0, s, c])
-        return start + [0.0, s, c - 0.1], velocity, acceleration
-
-    contacts = fb.Contacts.feet(robot, mu=0.6)
-    walk = Walk(robot, contacts, Gait.trot(robot), tasks=[fb.FrameTask(frame, circle)])
-    push = fb.Push([0.0, 150.0, 0.0], start=3.0)
-    run = fb.rollout(fb.Simulation(robot), walk, 6.0, [push], 2e-3)
-    error = 1e3 * max(
-        np.linalg.norm(run.state(i).point(frame) - circle(run.time[i])[0])
-        for i in range(0, len(run), 5)
-    )
-    return judged(
-        "anymal_kinova: hand on a circle in the world, trot, push of 150 N (2 ms)",
-        run,
-        most("hand within {:.1f} mm", error, 5.0),
-    )
 
 
 def step_time(name: str, gait: Callable[[fb.Robot], Gait], impulse: float) -> Row:
@@ -339,14 +282,8 @@ def rows(n: int) -> Iterator[Row]:
     yield talos_pushed(max(1, 12 * n // 30))
     yield recovered("go2", 100.0, 400.0, lambda robot: Gait.trot(robot, swing=0.2), n)
     yield recovered("talos", 300.0, 600.0, lambda robot: Gait.walk(robot, swing=0.4), n)
-    for yaw_rate in (0.5, 1.5):
-        yield turned(yaw_rate)
     for gait, mu in (("walk", 0.6), ("pace", 0.8), ("bound", 0.6), ("bound", 1.0), ("pronk", 0.6)):
         yield gait_walked("go2", gait, mu)
-    yield bolt_walked()
-    for degrees, known in ((5.0, False), (5.0, True), (-5.0, True)):
-        yield sloped(degrees, known)
-    yield hand_held()
     yield first_infeasible()
     yield step_time("go2", Gait.trot, 30.0)
     yield step_time("talos", Gait.walk, 90.0)

@@ -123,6 +123,38 @@ def shifted(
     return other_rng
 
 
+@pytest.fixture(scope="session")
+def go2() -> Any:
+    import judges  # loads all robots
+
+    return judges.load("go2")
+
+
+@pytest.fixture(scope="session")
+def talos() -> Any:
+    import judges
+
+    return judges.load("talos")
+
+
+@pytest.fixture(scope="session")
+def standing(go2: Any) -> Any:
+    return go2.standing()
+
+
+@pytest.fixture
+def robot(request: pytest.FixtureRequest) -> Any:
+    """The robot of that name: `parametrize("robot", [...], indirect=True)`."""
+    import judges
+
+    return judges.load(request.param)
+
+
+@pytest.fixture(params=["compiled", "reference"])
+def backend(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
 def pytest_report_header(config: pytest.Config) -> str:
     return f"random numbers: --seed {config.getoption('--seed')}"
 

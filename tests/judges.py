@@ -18,9 +18,6 @@ from scipy.optimize import linprog
 
 import floatbase as fb
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.errors import InfeasibleError
-from floatbase.qp import QP
-from floatbase.robots import Robot, State
 from floatbase.simulation._conversion import Conversion
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +27,7 @@ AGREEMENT = 1e-8  # part of the strongest motor's limit between two ways to the 
 
 
 @cache
-def load(name: str) -> Robot:
+def load(name: str) -> fb.Robot:
     """A catalogue robot, loaded once."""
     return fb.load(name)
 
@@ -39,9 +36,9 @@ FLOATING = tuple(name for name in ROBOTS if load(name).is_floating)
 FLAT = tuple(
     name for name in ROBOTS if load(name).feet and all(foot.is_flat for foot in load(name).feet)
 )
-# `name = judges.every_robot` runs a file on each
-every_robot = pytest.fixture(params=ROBOTS)(lambda request: request.param)
-every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: request.param)
+# `robot = judges.every_robot` runs a file on each
+every_robot = pytest.fixture(params=ROBOTS)(lambda request: load(request.param))
+every_floating_robot = pytest.fixture(params=FLOATING)(lambda request: load(request.param))
 # one of each kind: point feet with enough torques and with too few, flat feet, bolted down
 KINDS = ("go2", "solo8", "talos", "ur5")
 BALLS = tuple(name for name in FLOATING if name not in FLAT)
@@ -53,12 +50,12 @@ def sampled(names: Iterable[str], *kept: str) -> list[object]:
     return [name if name in kept else pytest.param(name, marks=later) for name in names]
 
 
-def states(name: str, n: int, spread: float = 0.3) -> list[State]:
+def states(name: str, n: int, spread: float = 0.3) -> list[fb.State]:
     """n random states of a robot, the same ones every time."""
     return [load(name).random_state(seed, spread) for seed in range(n)]
 
 
-def stance(robot: Robot, mu: float = 0.7) -> fb.Contacts:
+def stance(robot: fb.Robot, mu: float = 0.7) -> fb.Contacts:
     """The contacts a robot stands on: flat feet by their corners, balls by their lowest points,
     none for a fixed base.
     """
@@ -77,7 +74,7 @@ def controller_of(name: str, **options: object) -> fb.WholeBodyController:
 
 
 def pair(
-    robot: Robot, contacts: fb.Contacts, tasks: list[object] | None = None, **options: object
+    robot: fb.Robot, contacts: fb.Contacts, tasks: list[object] | None = None, **options: object
 ) -> tuple[fb.WholeBodyController, fb.WholeBodyController]:
     """The compiled and the reference controller of one problem; without tasks, of standing."""
     tasks = list(fb.standing_tasks(robot.standing())) if tasks is None else tasks
@@ -88,7 +85,7 @@ def pair(
     return compiled, reference
 
 
-def near_and_far(name: str, n: int) -> list[State]:
+def near_and_far(name: str, n: int) -> list[fb.State]:
     """n states near standing, n farther and n far away, where friction and torque limits hold most
     of them.
     """
@@ -96,15 +93,15 @@ def near_and_far(name: str, n: int) -> list[State]:
 
 
 def difference(
-    one: fb.WholeBodyController, other: fb.WholeBodyController, state: State, t: float = 0.0
+    one: fb.WholeBodyController, other: fb.WholeBodyController, state: fb.State, t: float = 0.0
 ) -> float:
     """Largest torque between two controllers, N·m; where there is no answer, both must say so with
     the same rows.
     """
     try:
         expected = other(state.q, state.v, t)
-    except InfeasibleError as error:
-        with pytest.raises(InfeasibleError) as caught:
+    except fb.InfeasibleError as error:
+        with pytest.raises(fb.InfeasibleError) as caught:
             one(state.q, state.v, t)
         assert caught.value.constraints == error.constraints
         return 0.0
@@ -116,13 +113,13 @@ def difference(
 
 
 def largest_difference(
-    both: tuple[fb.WholeBodyController, fb.WholeBodyController], at: list[State], t: float = 0.0
+    both: tuple[fb.WholeBodyController, fb.WholeBodyController], at: list[fb.State], t: float = 0.0
 ) -> float:
     """Largest `difference` [N·m] at these states."""
     return max(difference(*both, state, t) for state in at)
 
 
-def agreement(robot: Robot) -> float:
+def agreement(robot: fb.Robot) -> float:
     """N·m that may lie between two ways to the same torques."""
     return AGREEMENT * float(np.max(robot.torque_limits[np.isfinite(robot.torque_limits)]))
 
@@ -204,13 +201,13 @@ class Mujoco:
     The model is that of the simulation, unless another one is given.
     """
 
-    def __init__(self, robot: Robot, model: mujoco.MjModel | None = None):
+    def __init__(self, robot: fb.Robot, model: mujoco.MjModel | None = None):
         self.robot = robot
         self.model = fb.Simulation(robot).model if model is None else model
         self.data = mujoco.MjData(self.model)
         self.convert = Conversion(robot, self.model)
 
-    def move_to(self, state: State) -> Self:
+    def move_to(self, state: fb.State) -> Self:
         """Move MuJoCo's model to a state."""
         self.data.qpos[:], self.data.qvel[:] = self.convert.to_mujoco(state.q, state.v)
         mujoco.mj_fwdPosition(self.model, self.data)
@@ -267,29 +264,29 @@ def mujoco_of(name: str) -> Mujoco:
     return Mujoco(load(name))
 
 
-def along(state: State, direction: npt.ArrayLike, step: float) -> State:
+def along(state: fb.State, direction: npt.ArrayLike, step: float) -> fb.State:
     """The state moved along a velocity direction for a time `step`; v stays as it is."""
     return state.replace(q=state.integrate(step * np.asarray(direction, dtype=np.float64)))
 
 
 def derivative(
-    f: Callable[[State], Array], state: State, direction: npt.ArrayLike, step: float = 1e-5
+    f: Callable[[fb.State], Array], state: fb.State, direction: npt.ArrayLike, step: float = 1e-5
 ) -> Array:
     """d/dt f along a velocity direction, by central differences."""
     return (f(along(state, direction, step)) - f(along(state, direction, -step))) / (2.0 * step)
 
 
-def jacobian_of(f: Callable[[State], Array], state: State, step: float = 1e-6) -> Array:
+def jacobian_of(f: Callable[[fb.State], Array], state: fb.State, step: float = 1e-6) -> Array:
     """The derivative of f in v's directions, column by column, by central differences."""
     return np.column_stack([derivative(f, state, e, step) for e in np.eye(state.robot.nv)])
 
 
-def drift_of(J: Callable[[State], Array], state: State) -> Array:
+def drift_of(J: Callable[[fb.State], Array], state: fb.State) -> Array:
     """J̇ v: the derivative of J(q) v along v with v constant, by central differences."""
     return derivative(lambda s: J(s) @ state.v, state, state.v)
 
 
-def moved(state: State, qdd: Array, t: float) -> State:
+def moved(state: fb.State, qdd: Array, t: float) -> fb.State:
     """The configuration a short time t away (either way) when the robot accelerates with q̈: right
     to third order in t.
     """
@@ -297,14 +294,14 @@ def moved(state: State, qdd: Array, t: float) -> State:
 
 
 def acceleration_of(
-    f: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4
+    f: Callable[[fb.State], Array], state: fb.State, qdd: Array, step: float = 2e-4
 ) -> Array:
     """d²/dt² f under the acceleration q̈, by central differences."""
     return (f(moved(state, qdd, step)) - 2.0 * f(state) + f(moved(state, qdd, -step))) / step**2
 
 
 def turning_acceleration_of(
-    R: Callable[[State], Array], state: State, qdd: Array, step: float = 2e-4
+    R: Callable[[fb.State], Array], state: fb.State, qdd: Array, step: float = 2e-4
 ) -> Array:
     """The angular acceleration in the world of a rotation matrix under q̈, by differences of small
     turns.
@@ -352,7 +349,7 @@ def relative(found: npt.ArrayLike, expected: npt.ArrayLike) -> float:
     )
 
 
-def is_feasible(qp: QP, rows: list[int]) -> bool:
+def is_feasible(qp: fb.QP, rows: list[int]) -> bool:
     """Whether a point satisfies the equalities and the hard ones of these inequality rows, by a
     linear program on the whole problem.
     """
@@ -363,7 +360,7 @@ def is_feasible(qp: QP, rows: list[int]) -> bool:
     return bool(found.status == 0)
 
 
-def is_smallest_conflict(qp: QP, names: Iterable[str]) -> bool:
+def is_smallest_conflict(qp: fb.QP, names: Iterable[str]) -> bool:
     """Whether these inequality rows are infeasible together but feasible without any one."""
     rows = [qp.inequality_names.index(name) for name in names]
     return not is_feasible(qp, rows) and all(

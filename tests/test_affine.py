@@ -109,7 +109,7 @@ def test_the_gradient_is_the_slope_of_the_cost(seed, n):
 
 
 @given(seeds, sizes)
-def test_no_point_costs_less_than_the_minimiser(seed, n):
+def test_no_point_costs_less_than_the_minimizer(seed, n):
     rng = np.random.default_rng(seed)
     cost = quadratic(rng, n)
     best = cost.minimiser()
@@ -118,7 +118,7 @@ def test_no_point_costs_less_than_the_minimiser(seed, n):
 
 
 @given(seeds, st.integers(1, 3), st.integers(4, 6))
-def test_among_many_minimisers_the_smallest_is_given(seed, m, n):
+def test_among_many_minimizers_the_smallest_is_given(seed, m, n):
     rng = np.random.default_rng(seed)
     A, r = rng.normal(size=(m, n)), rng.normal(size=m)
     expected = np.linalg.lstsq(A, r)[0]
@@ -211,8 +211,6 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
 @pytest.mark.parametrize(
     "case",
     [
-        (lambda: fb.Affine(np.eye(2), np.zeros(3)), "b", 3, 2),
-        (lambda: fb.Affine(np.zeros(2), np.zeros(2)), "A", 2),
         (lambda: fb.Affine.identity(2)([1.0]), "x", 1, 2),
         (lambda: fb.Affine.identity(2) @ fb.Affine.identity(3), 3, 2),
         (lambda: fb.Affine.identity(2) + fb.Affine.identity(3), 2, 3),
@@ -221,10 +219,8 @@ def test_values_share_no_array_with_what_they_were_made_of_and_keep_their_blocks
             3),
         (lambda: fb.Affine.stack(),),
         (lambda: fb.Affine.stack(tau=fb.Affine.identity(1))["toe"], "toe", "tau"),
-        (lambda: fb.Quadratic(np.eye(2), np.zeros(3)), "H", 2, 3),
         (lambda: fb.Quadratic.zero(2) + fb.Quadratic.zero(3), 2, 3),
         (lambda: fb.Quadratic.zero(2).pullback(fb.Affine.identity(3)), 3, 2),
-        (lambda: fb.Quadratic.from_residual([[1.0]], [0.0], -1.0), "weight", -1),
     ],
 )  # fmt: skip
 def test_shapes_that_do_not_fit_are_named(case):

@@ -23,25 +23,23 @@ import robots_tried  # noqa: E402
 import soak  # noqa: E402
 import tick  # noqa: E402
 
-import floatbase as fb  # noqa: E402
 from floatbase import control, dynamics, objectives  # noqa: E402
 from floatbase.objectives._task import TargetTask  # noqa: E402
 
 
-def test_the_time_of_every_task_constraint_and_inequality_is_measured():
+def test_the_time_of_every_task_constraint_and_inequality_is_measured(go2):
     public = {getattr(objectives, name) for name in objectives.__all__}
     tasks = {each for each in public if isinstance(each, type) and issubclass(each, TargetTask)}
-    robot = fb.load("go2")
-    assert tasks == {type(task) for task in tick.added_tasks(robot)}
-    added = {type(c).__name__ for group in tick.added_contacts(robot).values() for c in group}
-    names = {*added, *tick.added_inequalities(robot), *tick.added_contacts(robot)}
+    assert tasks == {type(task) for task in tick.added_tasks(go2)}
+    added = {type(c).__name__ for group in tick.added_contacts(go2).values() for c in group}
+    names = {*added, *tick.added_inequalities(go2), *tick.added_contacts(go2)}
     public = [getattr(module, name) for module in (dynamics, control) for name in module.__all__]
     for each in public:
         makes = getattr(each, "__annotations__", {}).get("return", "")
         is_constraint = hasattr(each, "row_names") and not getattr(each, "_is_protocol", False)
         if makes in {"LinearConstraint", "LinearInequality"} or is_constraint:
             assert each.__name__ in {*names, "FlatFootContact", "LinearInequality"}
-    blocks = {each.block for each in tick.added_inequalities(robot).values()}
+    blocks = {each.block for each in tick.added_inequalities(go2).values()}
     assert blocks == set(typing.get_args(dynamics.Block))
 
 

@@ -1,11 +1,13 @@
 """All public functions and constructors, called with one wrong argument at a time.
 
-A wrong argument must raise an error of the package, not another exception, a warning, or an answer.
-New functions are tested without an entry here. Right arguments come from `values`, by annotation
-and by name. What each kind of check refuses is tested once, with all of `WRONG`.
+A wrong argument must raise an error of the package that names the parameter, not another exception,
+a warning, or an answer. New functions are tested without an entry here. Right arguments come from
+`values`, by annotation and by name. What each kind of check refuses is tested once, with all of
+`WRONG`.
 """
 
 import inspect
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import is_dataclass
@@ -23,7 +25,8 @@ import pytest
 from values import UP, controller, record, values
 
 import floatbase as fb
-from floatbase.errors import FloatbaseError
+from floatbase.actuators import Delay, FirstOrderLag, HydraulicActuators
+from floatbase.errors import FloatbaseError, InputError
 from floatbase.friction import FrictionCone, FrictionPolyhedron
 from floatbase.lessons import qp_plots
 from floatbase.lessons.lessonC import table_top
@@ -40,18 +43,43 @@ PACKAGES = (
 MODULES = (run_plots, qp_plots, recording)
 import_module("meshcat")  # warns when it is first imported
 # for every parameter; a robot's state, say, becomes that of another robot instead of ragged numbers
-FEW = {"NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]]}
-# what makes sense after all; a problem is checked when its QP is built
-OTHERS = {f"Problem({name}=of another robot)" for name in ("robot", "contacts")}
-ACCEPTED = {"rounded(x=NaN)", *OTHERS}
+FEW = {
+    "NaN": np.nan, "instance": SimpleNamespace(), "ragged": [[1.0], [1.0, 2.0]],
+    "7 numbers": np.ones(7), "-1": -1.0,
+}  # fmt: skip
+# what makes sense after all; some is checked when a problem's QP is built
+ACCEPTED = {
+    "NaN": "rounded(x)",
+    "of another robot": "Problem(robot) Problem(contacts)",
+    "7 numbers": """
+        ForceTask(target) TorqueTask(target) PostureTask(q) PostureTask(velocity)
+        PostureTask(acceleration) JointTargets(position) JointTargets(velocity)
+        JointTargets(stiffness) JointTargets(damping) JointTargets(torque) Limits(torque_limits)
+        ConstantTorques(tau) Affine.constant(b) rounded(x) PictureOptions(qdd)
+        recording.sampled_rows(times)""",
+    "-1": """
+        Ground(offset) Robot.standing(offset) Box(top) View(azimuth) View(elevation) Quadratic(c)
+        rounded(x) force_bias(a) normal_bias(a) AnalyticController(a) Walk(height) Walk(pitch)
+        recording.joint_limits_at(row) recording.push_at(row) nodding_rotation(size)""",
+}
+# angles, rates and times, which may be negative in all functions, and in some
+SIGNED = """
+    facet_rotation yaw_rate t Gait.start stop crouch push take_off apex touchdown lead lift_off
+    time_to_touchdown start_time begin
+"""
+# what messages say instead of the parameter's name
+ALIASES = {
+    "items": "contacts", "ground": "Ground", "student": "id", "observers": "observer 0",
+    "coefficients": "G", "normals": "normal", "feet": "foot", "g": "[AH] has shape",
+    "scale": "max_lever_angle",
+}  # fmt: skip
 
 # for every kind of check
 WRONG = {
     **FEW, "None": None, "inf": np.inf, "x": "x", "1": "1", "bytes": b"1", "empty": [],
     "deep": np.zeros((2, 2, 2, 2)),
     "objects": np.array([None, 1.0, "x"], dtype=object), "complex": 1.0 + 2.0j, "True": True,
-    "-1": -1.0, "0": 0,
-    "1e300": 1e300, "1e308": 1e308, "10**400": 10**400, "10**7": 10**7,
+    "0": 0, "1e300": 1e300, "1e308": 1e308, "10**400": 10**400, "10**7": 10**7,
     "date": datetime(2020, 1, 1), "dict": {"a": 1.0}, "class": fb.State,
     "generator": (entry for entry in (1.0, 2.0, 3.0)), "complex array": UP + 0.5j,
     "masked array": np.ma.masked_less(UP, 1.0),
@@ -108,6 +136,9 @@ def right():
         "float": 0.5, "int": 3, "str": "FL_foot", "Callable": lambda *given: None,
         "Array": up, "npt.ArrayLike": up, "a": 10.0, "alpha": 0.1, "rate": 30.0, "omega": 5.0,
         "N": np.eye(12)[:, :3],
+        "Delay": Delay(robot, 0.01), "FirstOrderLag": FirstOrderLag(robot, 5.0),
+        "HydraulicActuators": HydraulicActuators(robot), "dt": 1e-3,
+        "tau_desired": x, "q_joints": state.q[7:], "v_joints": x,
         "x": x, "tau": x, "beta": x, "max_lever_angle": x, "scale": np.ones(12),
         "q": state.q, "v": state.v, "dv": np.zeros(18), "qdd": np.zeros(18),
         "Q": state.q[None], "V": state.v[None],
@@ -121,7 +152,8 @@ def right():
         "nodding_rotation.rotation": np.eye(3), "cost": fb.Quadratic.zero(12),
         "Push.horizontal.force": 40.0, "Jump.height": 0.1,
         "feasible_polygon.box": (-1.0, 1.0, -1.0, 1.0),
-        "with_floating_base.robot": judges.load("ur5"),
+        "with_floating_base.robot": judges.load("ur5"), "flat_feet.robot": judges.load("talos"),
+        "linear.A": np.eye(3), "from_residual.A": np.eye(3),
         "load.name": "go2", "load_urdf.path": str(judges.load("ur5").urdf),
         "MujocoAdapter.model": fb.Simulation(robot).model,
         "load_mjcf.path": str(Path(__file__).parent / "robots/hopper.xml"),
@@ -143,13 +175,13 @@ NOT_CALLED = """
     NumericJudge check compare hand_in import_answers predict recall reveal review
     Playground playground sweep read_sweep push_recovery
     conflicting_constraints constraint_and_jacobian raibert_foothold TorqueCommand State.unchecked
-    recording.as_rollout recording.swing_feet_at
+    recording.as_rollout recording.swing_feet_at Affine.stack
 """
 
 
 WITH_METHODS = """
     Robot State Contacts EquationsOfMotion FeasibleSpace WholeBodyController
-    Affine Quadratic FrictionCone FrictionPolyhedron Gait
+    Affine Quadratic FrictionCone FrictionPolyhedron Gait Delay FirstOrderLag HydraulicActuators
 """
 
 
@@ -185,7 +217,7 @@ def callees():
         seen |= {id(value) for value in public.values()}
     for name in WITH_METHODS.split():
         of = right()[name]
-        methods = inspect.getmembers(of, inspect.ismethod)
+        methods = inspect.getmembers(of, lambda x: inspect.ismethod(x) or inspect.isfunction(x))
         found["floatbase"] += [
             Callee(f"{name}.{method}", value)
             for method, value in methods
@@ -250,8 +282,11 @@ def wrongs(callee, name):
     return wrong | {"of another robot": others()[kind]}
 
 
-def answer_of(callee, **wrong):
-    """Return what is wrong with the answer if `wrong` replaces right arguments, or None."""
+def answer_of(callee, named="", **wrong):
+    """Return what is wrong with the answer if `wrong` replaces right arguments, or None.
+
+    named: what an InputError must say.
+    """
     right()["Simulation"].reset()
     arguments = rights_of(callee) | wrong
     positional = [
@@ -259,17 +294,17 @@ def answer_of(callee, **wrong):
         for p in callee.parameters
         if p.default is p.empty and p.kind not in (p.KEYWORD_ONLY, p.VAR_KEYWORD)
     ]
-    return answer(partial(callee.call, *positional, **arguments))
+    return answer(partial(callee.call, *positional, **arguments), named)
 
 
-def answer(call):
+def answer(call, named=""):
     """What is wrong with the answer to a wrong argument, or None."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         try:
             call()
-        except FloatbaseError:
-            return None
+        except FloatbaseError as error:
+            is_named = type(error) is not InputError or re.search(rf"\b({named})\b", str(error))
+            return None if is_named else f"does not name {named}: {str(error)[:100]}"
         except Exception as error:
             return f"{type(error).__name__}: {str(error)[:100]}"
     return "accepted"
@@ -285,8 +320,15 @@ def test_wrong_arguments_raise_an_error_of_the_package(package, tmp_path, monkey
         assert answer_of(callee) == "accepted", f"`right` needs other arguments of {callee.name}"
         for name in [p.name for p in callee.parameters]:
             for label, wrong in wrongs(callee, name).items():
-                faults[f"{callee.name}({name}={label})"] = answer_of(callee, **{name: wrong})
-    assert {call: found for call, found in faults.items() if found and call not in ACCEPTED} == {}
+                named = "" if "another" in label else f"{name}|{ALIASES.get(name, name)}"
+                found, call = answer_of(callee, named, **{name: wrong}), f"{callee.name}({name})"
+                signed = label == "-1" and {name, f"{callee.name.split('.')[0]}.{name}"} & {
+                    *SIGNED.split()
+                }
+                meant = found == "accepted" and (signed or call in ACCEPTED.get(label, "").split())
+                if found and not meant:
+                    faults[f"{call}: {label}"] = found
+    assert faults == {}
 
 
 SAMPLES = 150

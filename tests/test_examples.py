@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
-import judges
 import loky
 import numpy as np
 import pinocchio as pin
@@ -45,40 +44,36 @@ def test_examples_are_short_enough_for_one_sitting():
     assert lengths.pop("wbc.py") <= 350 and max(lengths.values()) <= 60
 
 
-def test_wbc_computes_the_torques_of_the_library(wbc):
-    robot = judges.load("go2")
+def test_wbc_computes_the_torques_of_the_library(wbc, go2):
     controller = fb.WholeBodyController(
-        robot,
-        fb.Contacts.points(robot, mu=wbc.MU),
-        fb.standing_tasks(robot.standing().replace(q=wbc.Q_GOAL)),
+        go2,
+        fb.Contacts.points(go2, mu=wbc.MU),
+        fb.standing_tasks(go2.standing().replace(q=wbc.Q_GOAL)),
         joint_limits=None,
         backend="reference",
     )
     rng, active = np.random.default_rng(0), set()
     for speed in np.repeat([0.0, 0.3, 1.0], 10):  # m/s and rad/s
-        q = pin.integrate(robot.model, wbc.Q_GOAL, rng.uniform(-0.1, 0.1, robot.nv))
-        v = speed * rng.uniform(-1.0, 1.0, robot.nv)
+        q = pin.integrate(go2.model, wbc.Q_GOAL, rng.uniform(-0.1, 0.1, go2.nv))
+        v = speed * rng.uniform(-1.0, 1.0, go2.nv)
         command = controller(q, v)
         _, tau, _ = wbc.control(q, v)
-        assert np.all(np.abs(tau - command.tau) <= TORQUE * robot.torque_limits)
+        assert np.all(np.abs(tau - command.tau) <= TORQUE * go2.torque_limits)
         active |= {label.kind for label in command.active}
     assert {"friction", "lower torque limit", "upper torque limit"} <= active
 
 
-def test_wbc_stands_like_the_library(wbc):
-    robot = judges.load("go2")
-    state = robot.standing()
-    assert np.allclose(wbc.Q_GOAL, state.q, atol=1e-12)
-    assert np.allclose(wbc.COM_GOAL, state.com, atol=1e-12)
-    assert robot.feet[0].radius == wbc.RADIUS
+def test_wbc_stands_like_the_library(wbc, go2, standing):
+    assert np.allclose(wbc.Q_GOAL, standing.q, atol=1e-12)
+    assert np.allclose(wbc.COM_GOAL, standing.com, atol=1e-12)
+    assert go2.feet[0].radius == wbc.RADIUS
 
 
-def test_wbc_reads_states_of_mujoco_in_the_convention_of_pinocchio(wbc):
-    robot = judges.load("go2")
+def test_wbc_reads_states_of_mujoco_in_the_convention_of_pinocchio(wbc, go2):
     rng = np.random.default_rng(0)
-    q = pin.integrate(robot.model, wbc.Q_GOAL, rng.uniform(-1.0, 1.0, robot.nv))
-    state = fb.State(robot, q, rng.uniform(-1.0, 1.0, robot.nv))
-    sim = fb.Simulation(robot)
+    q = pin.integrate(go2.model, wbc.Q_GOAL, rng.uniform(-1.0, 1.0, go2.nv))
+    state = fb.State(go2, q, rng.uniform(-1.0, 1.0, go2.nv))
+    sim = fb.Simulation(go2)
     sim.reset(state)
     q, v = wbc.read_state(sim.data)
     assert np.allclose(q, state.q, atol=1e-12) and np.allclose(v, state.v, atol=1e-12)
@@ -132,15 +127,14 @@ def test_the_push_recovery_example_prints_and_draws_a_map(tmp_path, capsys, monk
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_demonstrations_are_states_of_the_simulation_and_torques_of_the_controller(capsys):
+def test_the_demonstrations_are_states_of_the_simulation_and_torques_of_the_controller(capsys, go2):
     q, v, tau = run("demonstrations", robots=8, steps=5)
     speed, simulation = re.findall(r"\d+", capsys.readouterr().out)
     assert int(speed) > 0 and 0 < int(simulation) < 100
-    robot = judges.load("go2")
-    sim, tasks = fb.Simulation(robot), fb.standing_tasks(robot.standing())
-    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks)
+    sim, tasks = fb.Simulation(go2), fb.standing_tasks(go2.standing())
+    controller = fb.WholeBodyController(go2, fb.Contacts.feet(go2), tasks)
     for i in range(8):
-        sim.reset(fb.State(robot, q[0, i], v[0, i]))
+        sim.reset(fb.State(go2, q[0, i], v[0, i]))
         for step in range(4):
             assert np.array_equal(controller(q[step, i], v[step, i]).tau, tau[step, i])
             sim.step(tau[step, i])

@@ -143,7 +143,7 @@ class HydraulicActuators:
         cylinders = self.cylinders
         tau = as_array("tau", np.zeros(cylinders.d) if tau is None else tau, (cylinders.d,), "N·m")
         force = self._desired_forces(
-            tau, cylinders.geometry(cylinders.max_lever_angle if q_joints is None else q_joints)
+            tau, self._geometry(cylinders.max_lever_angle if q_joints is None else q_joints)
         )
         # a valve with equal edges maintains a force if the pressure missing at A equals the excess
         # at B
@@ -166,7 +166,7 @@ class HydraulicActuators:
         ndarray, shape (d,)
             Torques [N·m].
         """
-        return self.cylinders.geometry(q_joints).lever * self.cylinders.force(self.state.pressures)
+        return self._geometry(q_joints).lever * self.cylinders.force(self.state.pressures)
 
     def step(
         self,
@@ -182,7 +182,7 @@ class HydraulicActuators:
 
         The joints are constant during the step, and the resulting torques act on the next one. With
         the spring of the oil, this is stable (symplectic Euler) for √(L² k / inertia) dt < 2. At 1
-        ms the robots of the catalogue reach 1.7.
+        ms the robots in the catalogue reach 1.7.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class HydraulicActuators:
             Torques at the end of the step [N·m].
         """
         cylinders = self.cylinders
-        geometry = cylinders.geometry(q_joints)
+        geometry = self._geometry(q_joints)
         force = self._desired_forces(
             as_array("tau_desired", tau_desired, (cylinders.d,), "N·m"), geometry
         )
@@ -213,6 +213,10 @@ class HydraulicActuators:
             state = self._advance(state, force, geometry, v, dt / steps)
         self.state = HydraulicState(*state)
         return geometry.lever * cylinders.force(self.state.pressures)
+
+    def _geometry(self, q_joints: npt.ArrayLike) -> CylinderGeometry:
+        q = as_array("q_joints", q_joints, (self.cylinders.d,), "rad")
+        return self.cylinders.geometry(q)
 
     def _desired_forces(self, tau: Array, geometry: CylinderGeometry) -> Array:
         """Return the piston forces for joint torques, shape (d,) [N].

@@ -27,7 +27,7 @@ and the forces follow from a quadratic program with friction pyramids:
 A foot in the air has no force in u. If all feet are in the air, the horizon only predicts the
 flight, and forces before it and after it decide how the robot takes off and lands.
 
-[DiCarlo2018]_, with the exact discretisation (M4) and the states eliminated (M5).
+[DiCarlo2018]_, with the exact discretization (M4) and the states eliminated (M5).
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def split_levels(tasks: Sequence[Task] | Sequence[Sequence[Task]]) -> tuple[list
         return list(tasks), []  # type: ignore[arg-type]
     if not all(are_levels):
         raise InputError(
-            "tasks mixes tasks and lists of tasks. Give a list of tasks, or a list of lists, one "
+            "tasks mixes tasks and lists of tasks. Pass a list of tasks, or a list of lists, one "
             "for each priority level."
         )
     levels: list[Sequence[Task]] = list(tasks)  # type: ignore[arg-type]

@@ -122,7 +122,7 @@ class AnalyticController(Value):
         if state.robot != robot:
             raise InputError(
                 f"state belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{robot.name}. Give a state of that robot."
+                f"{robot.name}. Pass a state of that robot."
             )
         equations_of_motion(state, contacts)  # unknown frames raise here, not in the loop
         weight_share = robot.weight / max(contacts.n_points, 1)
@@ -161,7 +161,7 @@ class AnalyticController(Value):
         if state.robot != self.robot:
             raise InputError(
                 f"eom belongs to the robot {state.robot.name}. The controller's robot is "
-                f"{self.robot.name}. Give the equations of that robot."
+                f"{self.robot.name}. Pass the equations of that robot."
             )
         a = -self._kp * (state.com - self.com) - self._kd * state.com_velocity
         R = state.frame_pose("base").rotation

@@ -162,7 +162,7 @@ class LinearInequality(Value):
         """
         if self.row_names and len(self.row_names) != m:
             raise InputError(
-                f"inequality {self.name!r} has {len(self.row_names)} row names but {m} rows. Give "
+                f"inequality {self.name!r} has {len(self.row_names)} row names but {m} rows. Pass "
                 f"one name for each row."
             )
         name = self.name

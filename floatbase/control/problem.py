@@ -233,7 +233,7 @@ class Problem(Value):
         if isinstance(state, State) and state.robot != self.robot:
             raise InputError(
                 f"state belongs to a different robot, {state.robot!r}. The robot of the problem is "
-                f"{self.robot!r}. Give a state of that robot."
+                f"{self.robot!r}. Pass a state of that robot."
             )
 
     def check(self, tasks: Sequence[Task] | None = None) -> None:

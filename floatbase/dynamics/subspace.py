@@ -157,7 +157,7 @@ def torque_force_space(eom: EquationsOfMotion) -> Affine:
     -----
     [FBR]_, eqs. (11), (24).
     """
-    return _orthonormalised(_torque_force_map(eom))
+    return _orthonormalized(_torque_force_map(eom))
 
 
 def motion_matrix(eom: EquationsOfMotion) -> tuple[Array, Array]:
@@ -311,7 +311,7 @@ def feasible_space(eom: EquationsOfMotion) -> FeasibleSpace:
     qdd = _acceleration_map(eom, torque_force["tau"], torque_force["forces"])
     return FeasibleSpace(
         eom,
-        _orthonormalised(
+        _orthonormalized(
             Affine.stack(qdd=qdd, tau=torque_force["tau"], forces=torque_force["forces"])
         ),
     )
@@ -429,7 +429,7 @@ def _acceleration_map(eom: EquationsOfMotion, tau: Affine, forces: Affine) -> Af
     return Affine(A, np.linalg.solve(eom.M, eom.S @ tau.b + eom.J.T @ forces.b - eom.h))
 
 
-def _orthonormalised(f: Affine) -> Affine:
+def _orthonormalized(f: Affine) -> Affine:
     """Write the values of f as v + V⊥ β with orthonormal V⊥ and the smallest v."""
     V = np.linalg.qr(f.A)[0]
     return Affine(V, f.b - V @ (V.T @ f.b), f.blocks)

@@ -125,7 +125,7 @@ def function_or_verdict(answer: Any) -> Callable[..., Any] | Verdict:
     """Return an answer that is a function, or a verdict that the answer is not a function."""
     if answer is None or answer is Ellipsis:
         return Verdict(
-            False, "There is no answer yet. Give your function, without parentheses.", "no_answer"
+            False, "There is no answer yet. Pass your function, without parentheses.", "no_answer"
         )
     if not callable(answer):
         return Verdict(

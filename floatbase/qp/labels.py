@@ -62,7 +62,7 @@ def constraint_labels(names: Iterable[str], count: int, kind: str) -> tuple[Cons
     labels = labels or tuple(ConstraintLabel(f"{kind} {i}") for i in range(count))
     if len(labels) != count:
         raise InputError(
-            f"There are {len(labels)} {kind} names for {count} rows. Give one name per row, or "
+            f"There are {len(labels)} {kind} names for {count} rows. Pass one name per row, or "
             f"none at all."
         )
     if len(set(labels)) != count:

@@ -45,7 +45,7 @@ _WHITESPACE = "\ufeff \t\r\n"
 
 
 def catalogue() -> dict[str, str]:
-    """List the robots of the catalogue.
+    """List the robots in the catalogue.
 
     Returns
     -------
@@ -74,13 +74,13 @@ def load(
         One of `catalogue()`, any other robot of example-robot-data that has a URDF, or the path of
         a file, which `load_urdf` or `load_mjcf` loads.
     feet : sequence of str or Foot, optional
-        Frames or `Foot` values that can touch the ground; by default those of the catalogue, or
+        Frames or `Foot` values that can touch the ground; by default those from the catalogue, or
         the lowest ends of the limbs of a floating-base robot outside the catalogue.
     foot_radius : float, optional
         Radius of the feet that are given as frames [m]; by default each is the ball, the sole or
         the wheel that its collision shapes form, or a point if it has none.
     torque_limits : float or array_like, shape (d,), optional
-        Torque limits [N·m]; by default those of the catalogue or the URDF.
+        Torque limits [N·m]; by default those from the catalogue or the URDF.
     posture : array_like, shape (nq,) or (nq - 7,), or mapping of str to float, optional
         Standing configuration of the robot before joints are locked, or its joints alone. By
         default the one that comes with the robot, with its joints brought within their limits. A
@@ -463,7 +463,7 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
         )
     if not isinstance(name, str) or name not in known:
         raise unknown_name(
-            "robot", name, known, "fb.catalogue() describes the robots of the catalogue."
+            "robot", name, known, "fb.catalogue() describes the robots in the catalogue."
         )
     if not known[name].urdf_filename:
         raise InputError(
@@ -474,7 +474,7 @@ def _find_loader(name: str, known: Mapping[str, Any]) -> Any:
 
 
 def _reference_posture(model: pin.Model, loader: Any, root: Path, entry: CatalogueEntry) -> Array:
-    """Return the reference posture of the SRDF with the joint angles of the catalogue.
+    """Return the reference posture of the SRDF with the joint angles from the catalogue.
 
     The rotor inertias of the SRDF are stored in the model.
     """

@@ -85,7 +85,7 @@ class Foot(Value):
             as_positive(f"radius of {self._label()}, a wheel,", self.radius, "m")
             if self.is_flat:
                 raise InputError(
-                    f"The foot {self.frame} has both corners and an axis. Give corners for a flat "
+                    f"The foot {self.frame} has both corners and an axis. Pass corners for a flat "
                     f"foot, or an axis for a wheel."
                 )
 

@@ -273,7 +273,7 @@ def _normalize_joint(name: str, joint: Element) -> None:
     axis.attrib.setdefault("xyz", "1 0 0")
     if max(map(abs, read_numbers(axis, "xyz"))) < 1e-12:  # rounding error
         raise InputError(
-            f'The <axis> of joint {label!r} of {name} is zero. Give a direction, as in xyz="0 0 1".'
+            f'The <axis> of joint {label!r} of {name} is zero. Set a direction, as in xyz="0 0 1".'
         )
     if limit is None:
         if kind in _LIMITED_JOINT_TYPES:
@@ -287,7 +287,7 @@ def _normalize_joint(name: str, joint: Element) -> None:
     if has_range and (lower > upper or math.isinf(lower) != math.isinf(upper)):
         raise InputError(
             f"Joint {label!r} of {name} has the limits lower={lower:g} and upper={upper:g} (rad or "
-            f"m; a missing limit is 0). The lower limit must not be above the upper limit. Give "
+            f"m; a missing limit is 0). The lower limit must not be above the upper limit. Set "
             f"two finite limits, or make the joint continuous if it has no limits."
         )
     for key, value in (("lower", lower), ("upper", upper)):

@@ -41,7 +41,7 @@ def _as_interval(name: str, value: Any) -> Array:
     if not ends[0] < ends[1]:
         raise InputError(
             f"{name} is {ends.tolist()}, but the first number must be smaller than the second. "
-            f"Give the two ends of the box in increasing order."
+            f"Pass the two ends of the box in increasing order."
         )
     return ends
 
@@ -387,7 +387,7 @@ class Ground(Value):
         normals, offsets = self.normals[self._upward_planes], self.offsets[self._upward_planes]
         if not len(normals):
             raise InputError(
-                "All planes of this ground are vertical, so it has no height. Give it a plane "
+                "All planes of this ground are vertical, so it has no height. Add a plane "
                 "whose normal points upwards."
             )
         heights = (offsets - points @ normals[:, :2].T) / normals[:, 2]

@@ -331,7 +331,7 @@ class Simulation:
         if not self.robot.has_joints_of(as_instance("state", state, State).robot):
             raise InputError(
                 f"The state belongs to a different robot. This simulation is for "
-                f"{self.robot.name}. Give a state of that robot."
+                f"{self.robot.name}. Pass a state of that robot."
             )
         with self._exclusive():
             self.link_collisions = False

@@ -252,7 +252,7 @@ def _factory_for(controller: Any) -> Callable[[], tuple[Simulation, Any]]:
     except Exception as error:
         raise InputError(
             f"This controller cannot be copied for each push ({type(error).__name__}: {error}). "
-            f"Give a function without parameters that returns it."
+            f"Pass a function without parameters that returns it."
         ) from error
 
 
@@ -307,7 +307,7 @@ def _largest_survived(
         survived, fatal = (middle, fatal) if survives(middle) else (survived, middle)
     if survived == 0 and (unpushed := pushed(0)).outcome != "completed":
         if unpushed.error is None:
-            raise SimulationError("The robot falls without a push. Give a controller that stands.")
+            raise SimulationError("The robot falls without a push. Pass a controller that stands.")
         raise SimulationError(f"The controller fails without a push: {unpushed.error}")
     return survived * resolution
 

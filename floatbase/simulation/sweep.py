@@ -135,7 +135,7 @@ def sweep(
     if cluster is not None and workers is not None:
         raise InputError(
             "workers is the number of processes on this computer, so it cannot be combined with "
-            "cluster. Give one of the two."
+            "cluster. Pass one of the two."
         )
     require("pandas", "sweep")  # missing libraries are reported before hours of work
     executor = _executor(_worker_count(workers), cluster)
@@ -170,7 +170,7 @@ def _grid_points(grid: Any) -> list[Row]:
             axes[name] = list(values)
             if not axes[name]:
                 raise InputError(
-                    f"The grid's {name!r} has no values, so the grid has no points. Give at least "
+                    f"The grid's {name!r} has no values, so the grid has no points. Pass at least "
                     f"one value."
                 )
         rows = itertools.product(*axes.values()) if axes else ()
@@ -189,7 +189,7 @@ def _grid_points(grid: Any) -> list[Row]:
             f"{short_repr(grid)}."
         )
     if not points:
-        raise InputError("The grid has no points. Give at least one point.")
+        raise InputError("The grid has no points. Pass at least one point.")
     for name in dict.fromkeys(name for point in points for name in point):
         if not isinstance(name, str) or name in RESERVED_NAMES:
             raise InputError(
@@ -333,7 +333,7 @@ def _dask_client(cluster: Any) -> Any:
         return distributed.Client(cluster, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(
-            f"No Dask scheduler answers at {cluster} ({error}). Give the address that "
+            f"No Dask scheduler answers at {cluster} ({error}). Pass the address that "
             "`dask scheduler` prints, such as tcp://127.0.0.1:8786."
         ) from None
 

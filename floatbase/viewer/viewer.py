@@ -52,7 +52,7 @@ class Viewer(Controls, Output):
     In a notebook, a viewer on the last line of a cell displays itself, wherever the kernel runs:
     its frames use the kernel's own connection, as slider values do. Elsewhere, open `viewer.url` in
     a browser. Only the newest display in a notebook is live; earlier ones show the image with which
-    they opened. Give each interactive part its own `Viewer`.
+    they opened. Use a separate `Viewer` for each interactive part.
 
     Parameters
     ----------

@@ -79,12 +79,8 @@ def test_torques_stay_within_the_limits_of_the_drivers():
     assert np.abs(servo.step(np.zeros(robot.d), q, np.zeros(robot.d), 0.001)).max() == 2.0
 
 
-def test_a_servo_refuses_wrong_gains_and_commands():
+def test_a_servo_refuses_a_step_without_a_command_and_one_without_accelerations():
     robot, _ = standing()
-    with raises(InputError, "stiffness", -1):
-        JointServo(robot, -1.0, 1.0)
-    with raises(InputError, "damping", 12):
-        JointServo(robot, 1.0, [1.0, 2.0])
     servo = JointServo(robot, 1.0, 1.0)
     with raises(InputError, "receive"):
         servo.step(np.zeros(12), np.zeros(12), np.zeros(12), 0.001)

@@ -13,7 +13,6 @@ import floatbase as fb
 from floatbase.behaviours import LIPM, Gait, StepPlan, Swing, Walk, raibert_foothold
 from floatbase.control import JointLimits
 from floatbase.errors import InputError
-from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
 
@@ -25,7 +24,7 @@ def trot(name: str = "go2", velocity: tuple[float, float] = (0.2, 0.0), **option
     )
 
 
-def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> Rollout:
+def run(walk: Walk, duration: float, *pushes: fb.Push, **options: Any) -> fb.Rollout:
     return fb.rollout(fb.Simulation(walk.robot, **options), walk, duration, pushes, PERIOD)
 
 
@@ -211,13 +210,11 @@ def test_a_class_derived_from_swing_keeps_its_shape_with_another_end():
     assert path(0.3)[0].tolist() == [0.2, 0.0, 1.0]
 
 
-def test_joints_brake_as_the_torque_limits_of_a_walk_allow():
-    robot = judges.load("go2")
-    torque_limits = 0.2 * robot.torque_limits
+def test_joints_brake_as_the_torque_limits_of_a_walk_allow(go2, standing):
+    torque_limits = 0.2 * go2.torque_limits
     walk = trot(torque_limits=torque_limits)
-    state = robot.standing()
-    command = walk(state.q, state.v, 0.0)
+    command = walk(standing.q, standing.v, 0.0)
     assert command.joint_limits is not None
-    expected = JointLimits.of(robot, torque_limits=torque_limits).braking
+    expected = JointLimits.of(go2, torque_limits=torque_limits).braking
     assert np.array_equal(command.joint_limits.braking, expected)
-    assert not np.array_equal(expected, JointLimits.of(robot).braking)
+    assert not np.array_equal(expected, JointLimits.of(go2).braking)

@@ -10,13 +10,12 @@ from messages import raises
 import floatbase as fb
 from floatbase.behaviours import Jump, JumpPlan
 from floatbase.errors import InputError
-from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
 
 
 @cache
-def jumped(name: str, height: float, distance: float) -> tuple[Rollout, Jump]:
+def jumped(name: str, height: float, distance: float) -> tuple[fb.Rollout, Jump]:
     robot = judges.load(name)
     jump = Jump(robot, fb.Contacts.feet(robot, mu=0.6), height, distance, start=0.05)
     return fb.rollout(fb.Simulation(robot), jump, 1.6, control_period=PERIOD), jump
@@ -52,12 +51,11 @@ def test_a_jump_reaches_its_height_and_distance(name, height, distance):
 @pytest.mark.parametrize(
     ("impulse", "ground"), [((2.4, 0, 0), None), ((0, 2.4, 0), None), ((0, 0, 6), fb.Ground())]
 )
-def test_a_push_in_flight_is_no_landing(impulse, ground):
+def test_a_push_in_flight_is_no_landing(impulse, ground, go2):
     """Without a known ground, a push upwards cannot be told from a landing."""
-    robot = judges.load("go2")
-    jump = Jump(robot, fb.Contacts.feet(robot, mu=0.6), 0.22, 0.0, start=0.05, ground=ground)
+    jump = Jump(go2, fb.Contacts.feet(go2, mu=0.6), 0.22, 0.0, start=0.05, ground=ground)
     push = fb.Push(np.array(impulse) / 0.1, start=jump.plan.apex + 0.02, duration=0.1)
-    run = fb.rollout(fb.Simulation(robot), jump, 1.2, [push], PERIOD)
+    run = fb.rollout(fb.Simulation(go2), jump, 1.2, [push], PERIOD)
     assert run.outcome == "completed"
 
 
@@ -84,22 +82,20 @@ def test_a_jump_that_motors_or_friction_cannot_do_is_refused(name, height, dista
         Jump(robot, fb.Contacts.feet(robot, mu=0.6), height, distance)
 
 
-def test_a_jump_needs_a_foot():
-    robot = judges.load("go2")
+def test_a_jump_needs_a_foot(go2):
     with raises(InputError, "contacts"):
-        Jump(robot, fb.Contacts.feet(robot).only(), 0.1)
+        Jump(go2, fb.Contacts.feet(go2).only(), 0.1)
 
 
 @pytest.mark.parametrize(
     ("rise", "known"), [(0.1, True), (-0.2, True), (0.05, False), (-0.1, False)]
 )
-def test_a_jump_lands_on_ground_of_another_height(rise, known):
-    robot = judges.load("go2")
-    contacts = fb.Contacts.feet(robot, mu=0.6)
-    edge = contacts.positions(robot.standing())[:, 0].max() + 0.03
+def test_a_jump_lands_on_ground_of_another_height(rise, known, go2):
+    contacts = fb.Contacts.feet(go2, mu=0.6)
+    edge = contacts.positions(go2.standing())[:, 0].max() + 0.03
     ground = fb.Ground.stairs(1, rise, start=edge)
-    jump = Jump(robot, contacts, 0.2, 0.5, start=0.05, ground=ground if known else None)
-    run = fb.rollout(fb.Simulation(robot, ground), jump, 2.2, control_period=PERIOD)
+    jump = Jump(go2, contacts, 0.2, 0.5, start=0.05, ground=ground if known else None)
+    run = fb.rollout(fb.Simulation(go2, ground), jump, 2.2, control_period=PERIOD)
     assert run.outcome == "completed"
     assert jump.phase == "landing"
     feet = run.foot_positions
@@ -121,20 +117,18 @@ def test_a_jump_plans_the_flight_to_the_height_of_the_ground():
         JumpPlan.of(0.2, 0.5, 0.1, 0.3, 9.81, rise=0.19)
 
 
-def test_a_jump_refuses_to_land_in_a_gap():
-    robot = judges.load("go2")
-    contacts = fb.Contacts.feet(robot, mu=0.6)
+def test_a_jump_refuses_to_land_in_a_gap(go2):
+    contacts = fb.Contacts.feet(go2, mu=0.6)
     gap = fb.Ground.gap(0.3, start=0.25)
     with raises(InputError, "distance", 0.4, -0.5):
-        Jump(robot, contacts, 0.15, 0.4, ground=gap)
+        Jump(go2, contacts, 0.15, 0.4, ground=gap)
     with raises(InputError, "ground", "height"):
-        Jump(robot, contacts, 0.15, ground=0.3)
+        Jump(go2, contacts, 0.15, ground=0.3)
 
 
 @pytest.mark.parametrize("limits", [12.0, np.full(12, 12.0)])
-def test_a_dry_run_compares_with_the_given_torque_limits(limits):
-    robot = judges.load("go2")
-    contacts = fb.Contacts.feet(robot, mu=0.6)
+def test_a_dry_run_compares_with_the_given_torque_limits(limits, go2):
+    contacts = fb.Contacts.feet(go2, mu=0.6)
     with raises(InputError, "torque", 12, 19):  # it needs 19 N·m, and go2 has 35 N·m in a knee
-        Jump(robot, contacts, 0.15, 0.1, torque_limits=limits)
-    Jump(robot, contacts, 0.15, 0.1, torque_limits=20.0)
+        Jump(go2, contacts, 0.15, 0.1, torque_limits=limits)
+    Jump(go2, contacts, 0.15, 0.1, torque_limits=20.0)

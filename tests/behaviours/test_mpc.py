@@ -16,8 +16,6 @@ from floatbase.behaviours import MPC, Gains, Gait, HorizonMotion, HorizonQP, Wal
 from floatbase.control import Command
 from floatbase.errors import InputError
 from floatbase.friction import FrictionPolyhedron
-from floatbase.qp import QP
-from floatbase.simulation import Rollout
 
 PERIOD = 2e-3  # s
 Problem = tuple[HorizonQP, tuple[Any, Any, Any, npt.NDArray[np.bool_]]]
@@ -144,7 +142,7 @@ class Observed:
 
 def walked(
     name: str, gait: Gait, velocity: float, duration: float, **options: Any
-) -> tuple[Rollout, Observed]:
+) -> tuple[fb.Rollout, Observed]:
     robot = judges.load(name)
     observed = Observed(
         MPC(robot, fb.Contacts.feet(robot, mu=0.6), gait, (velocity, 0.0), **options)
@@ -153,7 +151,7 @@ def walked(
 
 
 @pytest.fixture(scope="module")
-def flying() -> tuple[Rollout, Observed]:
+def flying() -> tuple[fb.Rollout, Observed]:
     return walked("go2", Gait.flying_trot(judges.load("go2"), start=0.2), 0.5, 2.0)
 
 
@@ -182,11 +180,10 @@ def test_other_robots_pronk_with_the_same_numbers(name):
 @pytest.mark.parametrize("facets", [3, 4, 6, 8, 16])
 @pytest.mark.parametrize("rotation", [0.0, 0.3])
 def test_the_corners_of_the_horizons_pyramid_are_inside_the_controllers_polyhedron(
-    facets, rotation
+    facets, rotation, go2
 ):
-    robot = judges.load("go2")
     walk = MPC(
-        robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot), facets=facets,
+        go2, fb.Contacts.feet(go2, mu=0.6), Gait.trot(go2), facets=facets,
         facet_rotation=rotation,
     )  # fmt: skip
     mu = walk.horizon.mu
@@ -197,24 +194,23 @@ def test_the_corners_of_the_horizons_pyramid_are_inside_the_controllers_polyhedr
     assert np.hypot(mu, mu) <= 0.6 + 1e-12  # inside the cone
 
 
-def test_the_force_task_follows_the_gains():
-    robot = judges.load("go2")
-    contacts, gait = fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.1)
+def test_the_force_task_follows_the_gains(go2):
+    contacts, gait = fb.Contacts.feet(go2, mu=0.6), Gait.trot(go2, start=0.1)
     diagonals: list[list[npt.NDArray[Any]]] = []
 
-    def record(qp: QP, eom: Any) -> QP:
+    def record(qp: fb.QP, eom: Any) -> fb.QP:
         diagonals[-1].append(np.diag(qp.H)[-eom.k :])  # the forces are the last variables
         return qp
 
     for gains in (None, Gains(com=(100.0, 30.0))):
         diagonals.append([])
-        walk = MPC(robot, contacts, gait, gains=gains, modify_qp=record)
-        walk(robot.standing().q, np.zeros(robot.nv))
+        walk = MPC(go2, contacts, gait, gains=gains, modify_qp=record)
+        walk(go2.standing().q, np.zeros(go2.nv))
     one, three = (found[-1] for found in diagonals)
     assert three == pytest.approx(3.0 * one)
-    assert np.all(one >= 0.02 * 10.0 / robot.mass**2)
+    assert np.all(one >= 0.02 * 10.0 / go2.mass**2)
     with raises(InputError, "gains"):
-        MPC(robot, contacts, gait, gains=3.0)
+        MPC(go2, contacts, gait, gains=3.0)
 
 
 @pytest.mark.parametrize(
@@ -226,25 +222,22 @@ def test_a_pronk_needs_a_horizon_or_a_reference_that_bounces(n, bounce, outcome)
     assert walked("go2", gait, 0.3, 1.4, n=n, bounce=bounce)[0].outcome == outcome
 
 
-def test_copies_and_restarts_give_the_same_torques():
-    robot = judges.load("go2")
-    walk = MPC(robot, fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.0), (0.3, 0.0))
+def test_copies_and_restarts_give_the_same_torques(go2):
+    walk = MPC(go2, fb.Contacts.feet(go2, mu=0.6), Gait.trot(go2, start=0.0), (0.3, 0.0))
     runs = [
-        fb.rollout(fb.Simulation(robot), each, 0.5, control_period=PERIOD)
+        fb.rollout(fb.Simulation(go2), each, 0.5, control_period=PERIOD)
         for each in (walk, walk, copy.deepcopy(walk))
     ]
     assert all(np.array_equal(run.tau, runs[0].tau) for run in runs)
 
 
-def test_walk_refuses_flight_and_mpc_refuses_soles():
-    robot = judges.load("go2")
-    contacts = fb.Contacts.feet(robot)
+def test_walk_refuses_flight_and_mpc_refuses_soles(go2, talos):
+    contacts = fb.Contacts.feet(go2)
     with raises(InputError, "MPC"):
-        Walk(robot, contacts, Gait.flying_trot(robot))
-    talos = judges.load("talos")
+        Walk(go2, contacts, Gait.flying_trot(go2))
     with raises(InputError, "flat foot", "left_sole_link"):
         MPC(talos, fb.Contacts.feet(talos), Gait.walk(talos))
     with raises(InputError, "solve_period", "0.05"):
-        MPC(robot, contacts, Gait.trot(robot), solve_period=0.05)
+        MPC(go2, contacts, Gait.trot(go2), solve_period=0.05)
     with raises(InputError, "bounce", "no"):
-        MPC(robot, contacts, Gait.pronk(robot), bounce="no")
+        MPC(go2, contacts, Gait.pronk(go2), bounce="no")

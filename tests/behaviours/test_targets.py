@@ -92,17 +92,15 @@ def test_velocities_and_accelerations_are_the_derivatives_of_the_targets(name):
             assert np.allclose(omega, values[9:12], atol=1e-3)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_the_base_leans_and_turns_without_jumps_on_ground_that_a_walk_knows(backend):
+def test_the_base_leans_and_turns_without_jumps_on_ground_that_a_walk_knows(backend, go2):
     """The derivatives of the target add up to its changes, also across changes of stance."""
-    robot = judges.load("go2")
-    contacts, gait = fb.Contacts.feet(robot, mu=0.6), Gait.trot(robot, start=0.05)
-    walk = Walk(robot, contacts, gait, (0.2, 0.0), 0.4, ground=fb.Ground(), backend=backend)
+    contacts, gait = fb.Contacts.feet(go2, mu=0.6), Gait.trot(go2, start=0.05)
+    walk = Walk(go2, contacts, gait, (0.2, 0.0), 0.4, ground=fb.Ground(), backend=backend)
     step, rows, stances = 2e-3, [], set()
     for t in step * np.arange(500):  # the feet are on a plane that tilts, as on stairs
-        q = robot.standing().q.copy()
+        q = go2.standing().q.copy()
         q[4], q[6] = np.sin(0.1 * np.sin(3.0 * t)), np.cos(0.1 * np.sin(3.0 * t))
-        rows.append(walk(q, np.zeros(robot.nv), t).targets["orientation of base"])
+        rows.append(walk(q, np.zeros(go2.nv), t).targets["orientation of base"])
         stances.add(walk.stance)
     R, omega, alpha = np.split(np.array(rows), [9, 12], axis=1)
     assert np.abs(R[:, 6]).max() > 0.05 and len(stances) > 1
@@ -135,12 +133,11 @@ def test_a_rollout_records_the_targets_of_each_step():
     assert {"position of FL_foot", "posture"} <= set(run.targets)
 
 
-def test_a_sole_turns_the_short_way_where_yaw_angles_jump_by_a_whole_turn():
+def test_a_sole_turns_the_short_way_where_yaw_angles_jump_by_a_whole_turn(talos):
     """The measured yaw jumps from π to -π, and the yaw of the path does not."""
-    robot = judges.load("talos")
-    gait = Gait.walk(robot, start=0.0)
-    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, yaw_rate=0.3)
-    state, turns = robot.standing(), []
+    gait = Gait.walk(talos, start=0.0)
+    walk = Walk(talos, fb.Contacts.feet(talos, mu=0.6), gait, yaw_rate=0.3)
+    state, turns = talos.standing(), []
     for t in np.arange(0.0, 3.0, 0.05):
         yaw = np.pi - 0.01 if t < 1.5 else -np.pi + 0.01
         q = state.q.copy()

@@ -118,12 +118,10 @@ def test_standing_the_planned_forces_carry_the_weight_and_are_the_measured_ones(
     assert np.max(np.abs(gaps)) < 1e-4 * robot.weight
 
 
-def test_it_goes_where_its_centre_of_mass_is_to_be():
-    robot = judges.load("go2")
-    start = robot.standing()
-    target = start.com + [0.02, -0.03, -0.02]
-    controller = AnalyticController(robot, fb.Contacts.points(robot), start, com=target)
-    run = fb.rollout(fb.Simulation(robot), controller, 1.2, control_period=PERIOD)
+def test_it_goes_where_its_centre_of_mass_is_to_be(go2, standing):
+    target = standing.com + [0.02, -0.03, -0.02]
+    controller = AnalyticController(go2, fb.Contacts.points(go2), standing, com=target)
+    run = fb.rollout(fb.Simulation(go2), controller, 1.2, control_period=PERIOD)
     assert run.outcome == "completed"
     assert np.linalg.norm(run.com[-1] - target) < 2e-3
 
@@ -186,16 +184,15 @@ def test_the_inertia_about_the_centre_of_mass_is_the_sum_over_mujocos_bodies(nam
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_robot_that_leans_is_turned_back(axis):
+def test_a_robot_that_leans_is_turned_back(axis, standing):
     """The sign of τ̃_c: the planned change of angular momentum opposes the lean."""
-    state = judges.load("go2").standing()
-    contacts = fb.Contacts.points(state.robot)
+    contacts = fb.Contacts.points(standing.robot)
     lean = np.zeros(18)
     lean[3 + axis] = 0.05
-    leaning = judges.along(state, lean, 1.0)
+    leaning = judges.along(standing, lean, 1.0)
     expected = -100.0 * 0.05 * inertia_about_com(leaning)[axis, axis]
-    q, v, model = leaning.q, leaning.v, state.robot.model
-    free = AnalyticController(state.robot, contacts, state, posture_weight=1e-7)
+    q, v, model = leaning.q, leaning.v, standing.robot.model
+    free = AnalyticController(standing.robot, contacts, standing, posture_weight=1e-7)
     # the default posture term takes its share
     for controller, share, rel in ((free, 1.0, 0.02), (controller_of("go2"), 0.65, 0.55)):
         qdd, data = controller(q, v).qdd, model.createData()
@@ -212,17 +209,16 @@ def turned(state: fb.State, yaw: float) -> fb.State:
     return state.replace(q=q)
 
 
-def test_the_torques_do_not_depend_on_the_way_the_robot_faces():
+def test_the_torques_do_not_depend_on_the_way_the_robot_faces(go2):
     """Rotation errors are world vectors.
 
     Rotating the desired posture and the state together changes nothing.
     """
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot)
+    contacts = fb.Contacts.points(go2)
     state = near("go2", 3, far=0.2)
     expected = controller_of("go2")(state.q, state.v).tau
     for yaw in (0.5, 1.6, 3.0):
-        facing = AnalyticController(robot, contacts, turned(robot.standing(), yaw))
+        facing = AnalyticController(go2, contacts, turned(go2.standing(), yaw))
         there = turned(state, yaw)
         tau = facing(there.q, there.v).tau
         assert np.allclose(tau, expected, atol=1e-6 * np.abs(expected).max())

@@ -166,7 +166,6 @@ def test_user_functions_run_in_the_calling_thread_and_their_errors_name_the_row(
     assert "50" in error.value.__notes__[0] and set(seen) == {threading.get_ident()}
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
 @pytest.mark.parametrize("shared", [True, False])
 def test_two_threads_get_the_commands_of_one(backend, shared):
     Q, V = (rows[:40] if backend == "compiled" else rows[:8] for rows in drawn())

@@ -5,7 +5,6 @@ import inspect
 import multiprocessing
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -23,6 +22,7 @@ import judges
 import numba
 import numpy as np
 import pytest
+from disk import full_disk
 from messages import missing, raises
 from numba.core.caching import CacheImpl
 from numba.core.runtime import _nrt_python as counts
@@ -33,19 +33,17 @@ import floatbase as fb
 from floatbase.__main__ import main
 from floatbase.control.tick import CompiledTick, announce_if_slow, jit, tick
 from floatbase.errors import InputError
-from floatbase.robots import Robot
 
 TICK = Path(tick.__file__).parent
 
 
-def tick_of(robot: Robot) -> CompiledTick:
+def tick_of(robot: fb.Robot) -> CompiledTick:
     """Return the compiled tick of a standing controller."""
     return judges.controller_of(robot.name).compiled
 
 
-def test_the_tick_numbers_its_rows_in_the_order_of_the_reference_qp() -> None:
+def test_the_tick_numbers_its_rows_in_the_order_of_the_reference_qp(go2) -> None:
     """Both have the same rows if all normal forces, torques and joints are bounded."""
-    go2 = judges.load("go2")
     made = judges.controller_of("go2", max_normal_force=100.0)
     q, v = go2.standing().q, np.zeros(go2.nv)
     inputs = made.compiled.inputs_at(q, v, 0.0)
@@ -94,7 +92,6 @@ def test_without_numba_the_reference_backend_answers_and_says_why(obstacle, envi
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
 @pytest.mark.filterwarnings("ignore:.*fork")  # Python 3.12 warns of just this
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_a_forked_process_can_tick_while_threads_of_its_parent_tick(backend):
     """Other threads and the locks that they hold do not exist in the forked process."""
     controller = judges.controller_of("go2", backend=backend)
@@ -308,12 +305,8 @@ def test_damaged_files_leave_a_compiled_tick_and_a_warning(suffix, damaged, smal
 
 
 def test_a_full_disk_leaves_a_compiled_tick_and_a_warning(small):
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))  # bytes: no file may grow
-    try:
+    with full_disk(0):
         assert not missing(small(), "OSError", "File too large", "NUMBA_CACHE_DIR")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert "disk" not in small()
 
 
@@ -362,9 +355,8 @@ def test_where_numba_fails_the_reference_backend_is_the_last_resort(monkeypatch)
 # memory -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_tick_reads_nothing_of_its_workspace_that_it_did_not_write(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "talos", "ur5"], indirect=True)
+def test_a_tick_reads_nothing_of_its_workspace_that_it_did_not_write(robot):
     compiled = tick_of(robot)
     floats, ints = compiled.workspace()
     answered = 0
@@ -380,11 +372,10 @@ def test_a_tick_reads_nothing_of_its_workspace_that_it_did_not_write(name):
     assert answered >= 10
 
 
-def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_small():
+def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_small(go2):
     """Real-time code must not allocate memory; only near-singular contacts do, for an SVD."""
-    robot = judges.load("go2")
-    compiled = tick_of(robot)
-    state = robot.random_state(5, 0.3)
+    compiled = tick_of(go2)
+    state = go2.random_state(5, 0.3)
     q, v = np.array(state.q), np.array(state.v)
     counts.memsys_enable_stats()
     before = rtsys.get_allocation_stats()
@@ -398,15 +389,14 @@ def test_a_tick_allocates_nothing_and_raises_an_error_if_its_workspace_is_too_sm
 
 
 @pytest.mark.parametrize("weight", [1e-10, 1e-15, 1e-20, 1e-25, 1e-30, 0.0])
-def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(weight):
+def test_an_answer_that_is_hardly_determined_is_left_to_the_reference_backend(weight, talos):
     """Internal forces cost almost nothing, so rounding may make them huge.
 
     Such answers are rejected.
     """
-    robot = judges.load("talos")
     light = [fb.ForceTask(weight=weight), fb.TorqueTask(weight=0.0)]
-    tasks = [*fb.standing_tasks(robot.standing()), *light]
-    compiled = judges.pair(robot, fb.Contacts.flat_feet(robot), tasks)[0].compiled
+    tasks = [*fb.standing_tasks(talos.standing()), *light]
+    compiled = judges.pair(talos, fb.Contacts.flat_feet(talos), tasks)[0].compiled
     for state in judges.states("talos", 5, 0.1):
         answer = compiled(np.array(state.q), np.array(state.v), 0.0)
         if answer is not None:

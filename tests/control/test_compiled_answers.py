@@ -28,7 +28,6 @@ from floatbase.objectives import (
     RelativePoseTask,
 )
 from floatbase.qp import FEASIBILITY_TOLERANCE, Solution
-from floatbase.robots import Robot, State
 
 # N·m between the backends if contact rows are dependent: the reference backend has no more digits
 DEPENDENT = 1e-6
@@ -54,7 +53,7 @@ def prove_optimal(solution: Solution) -> None:
     assert residuals.dual == 0.0
 
 
-def prove_all(controller: fb.WholeBodyController, states: list[State]) -> None:
+def prove_all(controller: fb.WholeBodyController, states: list[fb.State]) -> None:
     """Apply `prove_optimal` at all states except infeasible ones, of which there may be a few."""
     proved = 0
     for state in states:
@@ -133,14 +132,14 @@ def test_a_compiled_tick_gives_the_torques_of_the_reference_backend(label):
         prove_all(both[0], at)
 
 
-def resolution(robot: Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
+def resolution(robot: fb.Robot, contacts: fb.Contacts, q: np.ndarray) -> float:
     """Return the smallest singular value of A in (5), relative to the largest."""
-    eom = fb.equations_of_motion(State(robot, q, np.zeros(robot.nv)), contacts)
+    eom = fb.equations_of_motion(fb.State(robot, q, np.zeros(robot.nv)), contacts)
     s = np.linalg.svd(eom.A, compute_uv=False)
     return float(s[-1] / s[0])
 
 
-def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
+def with_resolution(state: fb.State, contacts: fb.Contacts, value: float) -> fb.State:
     """Return the state with this `resolution` on the line from standing through `state`.
 
     A loses rank at standing.
@@ -158,7 +157,7 @@ def with_resolution(state: State, contacts: fb.Contacts, value: float) -> State:
         below = resolution(robot, contacts, at(middle)) < value
         low, high = (middle, high) if below else (low, middle)
     assert resolution(robot, contacts, at(high)) == pytest.approx(value, rel=1e-6)
-    return State(robot, at(high), state.v)
+    return fb.State(robot, at(high), state.v)
 
 
 @pytest.mark.parametrize("share", [0.03, 0.3, 0.99, 1.01, 3.0])
@@ -177,21 +176,19 @@ def test_where_contact_rows_nearly_repeat_each_other_the_same_directions_count(s
 
 
 @pytest.mark.parametrize("bend", [0.0, 1e-7, 1e-5, 1e-3, 1e-2, 0.1])
-def test_straight_knees(bend):
-    robot = judges.load("go2")
-    both = judges.pair(robot, judges.stance(robot))
+def test_straight_knees(bend, go2):
+    both = judges.pair(go2, judges.stance(go2))
     for seed, state in enumerate(judges.states("go2", 4, 0.05)):
         q = np.array(state.q)
         q[9::3] = bend
-        straight = State(robot, q, np.zeros(robot.nv) if seed % 2 else state.v)
+        straight = fb.State(go2, q, np.zeros(go2.nv) if seed % 2 else state.v)
         expected = both[1](straight.q, straight.v).tau
         found = both[0](straight.q, straight.v).tau
         assert np.max(np.abs(found - expected)) < 1e-7 * (1.0 + np.max(np.abs(expected)))
 
 
-def test_every_task_with_targets_that_move():
-    robot = judges.load("go2")
-    at, ramp = robot.standing(), np.linspace(-1.0, 1.0, 12)
+def test_every_task_with_targets_that_move(go2):
+    at, ramp = go2.standing(), np.linspace(-1.0, 1.0, 12)
     foot = at.point("FL_foot") + [0.0, 0.0, 0.05]
 
     def rising(t: float) -> tuple[object, ...]:
@@ -212,7 +209,7 @@ def test_every_task_with_targets_that_move():
         fb.ForceTask(lambda t: np.full(9, 10.0 + t), weight=1e-4),
         fb.TorqueTask(np.ones(12), weight=1e-3),
     ]
-    both = judges.pair(robot, judges.stance(robot).without("FL_foot"), tasks)
+    both = judges.pair(go2, judges.stance(go2).without("FL_foot"), tasks)
     for t, state in enumerate(judges.near_and_far("go2", 4)):
         assert judges.difference(*both, state, 0.3 * t) < TORQUE
 
@@ -295,10 +292,9 @@ class Entries:
         return fb.Affine(self.rows, np.ones(len(self.rows)))
 
 
-@pytest.mark.parametrize("name", ["go2", "solo12"])
-def test_rows_with_hardly_any_curvature_are_no_conflict(name):
+@pytest.mark.parametrize("robot", ["go2", "solo12"], indirect=True)
+def test_rows_with_hardly_any_curvature_are_no_conflict(robot):
     """The rows of forces that are nearly undetermined seem to depend on one another."""
-    robot = judges.load(name)
     open_tasks = [Entries("forces", np.ones((1, 9))), Entries("tau", np.eye(12)[:2])]
     controller = fb.WholeBodyController(
         robot,
@@ -306,7 +302,7 @@ def test_rows_with_hardly_any_curvature_are_no_conflict(name):
         [*fb.standing_tasks(robot.standing()), *open_tasks],
         torque_limits=0.3 * robot.torque_limits,
     )
-    for state in judges.near_and_far(name, 8):
+    for state in judges.near_and_far(robot.name, 8):
         if controller.attempt(state.q, state.v) is None:
             with pytest.raises(InfeasibleError):
                 controller(state.q, state.v)
@@ -337,10 +333,9 @@ def test_motion_rows_that_disagree_while_the_feet_rest_are_left_to_the_reference
         (None, [1.0]),
     ],
 )
-def test_a_bad_state_is_refused_in_the_same_words(q, v):
-    robot = judges.load("go2")
-    compiled, reference = judges.pair(robot, judges.stance(robot))
-    q = robot.standing().q if q is None else q
+def test_a_bad_state_is_refused_in_the_same_words(q, v, go2):
+    compiled, reference = judges.pair(go2, judges.stance(go2))
+    q = go2.standing().q if q is None else q
     assert refusal(compiled, q, v) == refusal(reference, q, v)
 
 
@@ -351,35 +346,35 @@ def refusal(controller: fb.WholeBodyController, *given: object) -> str:
 
 
 @pytest.mark.parametrize("target", [[1.0, 2.0], [np.nan, 0.0, 0.0], "there"])
-def test_a_bad_target_is_refused_in_the_same_words(target):
-    robot = judges.load("go2")
-    state = robot.standing()
+def test_a_bad_target_is_refused_in_the_same_words(target, go2):
+    state = go2.standing()
     moving = fb.CoMTask(lambda t: target if t > 0 else state.com)
-    compiled, reference = judges.pair(robot, judges.stance(robot), [moving])
+    compiled, reference = judges.pair(go2, judges.stance(go2), [moving])
     assert refusal(compiled, state.q, state.v, 1.0) == refusal(reference, state.q, state.v, 1.0)
 
 
 # solutions ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_compiled_answer_proves_itself_on_the_reference_problem(name):
+@pytest.mark.parametrize("robot", ["go2", "talos"], indirect=True)
+def test_a_compiled_answer_proves_itself_on_the_reference_problem(robot):
     """All joints but one are limited to nine tenths of the largest torque that they would need."""
-    robot = judges.load(name)
     free, _ = judges.pair(robot, judges.stance(robot), torque_limits=np.inf)
     limited = np.arange(robot.d) != 4
-    torques = [free(state.q, state.v).tau[limited] for state in judges.near_and_far(name, 6)]
+    torques = [free(state.q, state.v).tau[limited] for state in judges.near_and_far(robot.name, 6)]
     limit = 0.9 * np.max(np.abs(torques))
     both = judges.pair(robot, judges.stance(robot), torque_limits=np.where(limited, limit, np.inf))
     kinds = set()
-    for state in judges.near_and_far(name, 6):
+    for state in judges.near_and_far(robot.name, 6):
         found, expected = (controller(state.q, state.v) for controller in both)
         r = found.solution.residuals
         assert max(r.stationarity, r.equality, r.inequality, r.complementarity) < 1e-6
         assert r.dual == 0.0
         assert found.solution.objective == pytest.approx(expected.solution.objective, rel=1e-9)
         assert np.allclose(found.solution["forces"], found.forces)
-        if name == "go2":  # a flat foot's four corners share one wrench: rows can be dependent
+        if (
+            robot.name == "go2"
+        ):  # a flat foot's four corners share one wrench: rows can be dependent
             assert set(found.active) == set(expected.active)
             for row, multiplier in expected.multipliers.items():
                 assert found.multipliers[row] == pytest.approx(multiplier, rel=1e-5, abs=1e-7)
@@ -387,9 +382,8 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(name):
     assert "torque" in kinds
 
 
-def test_a_command_keeps_its_numbers_when_the_state_moves_on():
-    robot = judges.load("go2")
-    controller, reference = judges.pair(robot, judges.stance(robot))
+def test_a_command_keeps_its_numbers_when_the_state_moves_on(go2):
+    controller, reference = judges.pair(go2, judges.stance(go2))
     state, other = judges.states("go2", 2)
     q, v = np.array(state.q), np.array(state.v)
     command = controller(q, v)
@@ -403,7 +397,7 @@ def test_a_command_keeps_its_numbers_when_the_state_moves_on():
 # tasks --------------------------------------------------------------------------------------------
 
 
-def moving_tasks(robot: Robot) -> dict[str, Any]:
+def moving_tasks(robot: fb.Robot) -> dict[str, Any]:
     """Return tasks with moving targets, on frames that move on their own and on fixed ones."""
     foot, other = robot.feet[0].frame, robot.feet[-1].frame
     pose, turned = np.eye(4), judges.rotation([0.3, -0.2, 0.5])
@@ -419,18 +413,17 @@ def moving_tasks(robot: Robot) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("name", ["go2", "g1", "talos"])
-def test_tasks_on_axes_relative_poses_and_momentum_are_compiled(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "g1", "talos"], indirect=True)
+def test_tasks_on_axes_relative_poses_and_momentum_are_compiled(robot):
     standing, added = fb.standing_tasks(robot.standing()), moving_tasks(robot)
     bound = 0.1 * judges.agreement(robot)  # 1e-9 of the strongest motor's limit
     for tasks in (*([task] for task in added.values()), added.values()):
         both = judges.pair(robot, judges.stance(robot), [*standing, *tasks])
         assert not both[0].compiled.user_terms.any
-        assert judges.largest_difference(both, judges.states(name, 3, 0.1), t=0.4) < bound
+        assert judges.largest_difference(both, judges.states(robot.name, 3, 0.1), t=0.4) < bound
 
 
-def added_terms(robot: Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
+def added_terms(robot: fb.Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
     """Return contacts and options of a controller: each kind of constraint and inequality."""
     feet, first = fb.Contacts.feet(robot), robot.feet[0].frame
     others, joints = feet.without(first), np.eye(robot.nv)[-4:]
@@ -461,16 +454,15 @@ def added_terms(robot: Robot) -> dict[str, tuple[fb.Contacts, dict[str, Any]]]:
     }
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_constraints_and_inequalities_of_the_package_are_compiled(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "talos"], indirect=True)
+def test_constraints_and_inequalities_of_the_package_are_compiled(robot):
     bound, active = 0.1 * judges.agreement(robot), set()
     tasks = [*fb.standing_tasks(robot.standing()), *moving_tasks(robot).values()]
     for contacts, options in added_terms(robot).values():
         both = judges.pair(robot, contacts, tasks, **options)
         *_, python = both[0].backend_reason.partition("beside it: ")
         assert all(each.startswith("the target of ") for each in python.split(", "))
-        for state in (*judges.states(name, 2, 0.1), robot.standing()):
+        for state in (*judges.states(robot.name, 2, 0.1), robot.standing()):
             one, other = (each(state.q, state.v, 0.4) for each in both)
             assert one.backend == "compiled"
             assert np.max(np.abs(one.tau - other.tau)) < bound
@@ -480,15 +472,14 @@ def test_constraints_and_inequalities_of_the_package_are_compiled(name):
     assert {"sides", "rise", "2.0"} <= active
 
 
-def test_a_wheel_on_its_side_and_a_robot_on_its_back_are_refused_in_the_same_words():
-    robot = judges.load("go2")
+def test_a_wheel_on_its_side_and_a_robot_on_its_back_are_refused_in_the_same_words(go2):
     wheel = fb.Contacts([RollingWheel("FL_foot", [0.0, 1.0, 0.0], 0.05)])
     for contacts, rows, turn in (
         (wheel, [], [1.0, 0.0, 0.0, 1.0]),
-        (fb.Contacts.feet(robot), [capture_point_inequality()], [1.0, 0.0, 0.0, 0.0]),
+        (fb.Contacts.feet(go2), [capture_point_inequality()], [1.0, 0.0, 0.0, 0.0]),
     ):
         q = np.concatenate([np.zeros(3), turn / np.linalg.norm(turn), np.zeros(12)])
-        both = judges.pair(robot, contacts, inequalities=rows)
+        both = judges.pair(go2, contacts, inequalities=rows)
         assert len({refusal(each, q, np.zeros(18)) for each in both}) == 1
 
 
@@ -523,16 +514,6 @@ def test_an_axis_opposite_to_its_direction_and_directions_of_any_length_have_ans
 # which backend runs -------------------------------------------------------------------------------
 
 
-def test_the_backend_is_visible_and_can_be_chosen():
-    state = judges.load("go2").standing()
-    for requested in ("auto", "compiled", "reference"):
-        backend = "compiled" if requested == "auto" else requested
-        controller = judges.controller_of("go2", backend=requested)
-        assert controller.backend == controller(state.q, state.v).backend == backend
-        assert backend in repr(controller)
-        assert controller.backend_reason
-
-
 def test_the_reason_of_the_backend_names_what_runs_as_python():
     robot, rows = judges.load("go2"), (np.eye(12), np.full(12, 1e3))
     mine = LinearInequality("mine", "tau", lambda eom, t: rows)
@@ -553,32 +534,28 @@ def test_another_solver_uses_the_reference_backend_and_the_reason_names_the_solv
         judges.controller_of("go2", solver="cvxpy", backend="compiled")
 
 
-def test_a_replaced_controller_is_like_a_new_one():
-    robot = judges.load("go2")
-    both = judges.pair(robot, judges.stance(robot), facets=6)
-    state = robot.random_state(3, 0.1)
+def test_a_replaced_controller_is_like_a_new_one(go2):
+    both = judges.pair(go2, judges.stance(go2), facets=6)
+    state = go2.random_state(3, 0.1)
     for frames in (["FL_foot"], ["FR_foot", "RL_foot"], ["FL_foot", "FR_foot", "RR_foot"]):
-        contacts = fb.Contacts.points(robot, frames=frames)
+        contacts = fb.Contacts.points(go2, frames=frames)
         assert judges.difference(*(one.replace(contacts=contacts) for one in both), state) < TORQUE
     with raises(InputError, "target", 12, 3):
         aimed = both[0].replace(tasks=[*both[0].tasks[:3], fb.ForceTask(np.zeros(12))])
-        aimed.replace(contacts=fb.Contacts.points(robot, frames=["FL_foot"]))
+        aimed.replace(contacts=fb.Contacts.points(go2, frames=["FL_foot"]))
 
 
-def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend():
-    robot = judges.load("go2")
-    state = robot.standing()
+def test_a_target_that_becomes_a_reflection_is_refused_by_the_reference_backend(go2, standing):
     mirrored = fb.OrientationTask("base", lambda t: np.diag([1.0, 1.0, 1.0 if t < 1.0 else -1.0]))
-    controller = fb.WholeBodyController(robot, judges.stance(robot), [mirrored], backend="compiled")
-    assert controller(state.q, state.v, 0.0).backend == "compiled"
+    controller = fb.WholeBodyController(go2, judges.stance(go2), [mirrored], backend="compiled")
+    assert controller(standing.q, standing.v, 0.0).backend == "compiled"
     with raises(InputError, "rotation", "base"):
-        controller(state.q, state.v, 2.0)
+        controller(standing.q, standing.v, 2.0)
 
 
-def test_a_tick_keeps_its_targets_when_another_tick_comes_between():
+def test_a_tick_keeps_its_targets_when_another_tick_comes_between(go2):
     """Two threads may share a controller: one tick's targets must not reach the other's problem."""
-    robot = judges.load("go2")
-    state, com = robot.standing(), robot.standing().com
+    state, com = go2.standing(), go2.standing().com
 
     def turning(t: float) -> np.ndarray:
         if t == 1.0:
@@ -587,7 +564,7 @@ def test_a_tick_keeps_its_targets_when_another_tick_comes_between():
 
     rising = fb.CoMTask(lambda t: com + [0.0, 0.0, 0.01 * t])
     tasks = [rising, fb.OrientationTask("base", turning), *fb.standing_tasks(state)[2:]]
-    compiled, reference = judges.pair(robot, judges.stance(robot), tasks)
+    compiled, reference = judges.pair(go2, judges.stance(go2), tasks)
     assert judges.difference(compiled, reference, state, 1.0) < TORQUE
 
 
@@ -602,26 +579,24 @@ def test_weights_far_apart_give_the_optimum_or_the_reference_backend(name, weigh
     prove_all(compiled, judges.states(name, 40, 0.3))
 
 
-def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend():
-    robot = judges.load("go2")
-    state = robot.random_state(2, 0.1)
+def test_a_rotation_in_printed_digits_means_the_nearest_one_and_stays_on_the_compiled_backend(go2):
+    state = go2.random_state(2, 0.1)
     exact = judges.rotation([0.1, -0.2, 0.3])
     U, _, Vt = np.linalg.svd(exact.astype(np.float32).astype(np.float64))
     for given in (exact.astype(np.float32), lambda t: exact.astype(np.float32)):
         tasks, nearest = ([fb.OrientationTask("base", R)] for R in (given, U @ Vt))
-        compiled, reference = judges.pair(robot, judges.stance(robot), tasks)
-        _, expected = judges.pair(robot, judges.stance(robot), nearest)
+        compiled, reference = judges.pair(go2, judges.stance(go2), tasks)
+        _, expected = judges.pair(go2, judges.stance(go2), nearest)
         found = compiled(state.q, state.v)
         assert found.backend == "compiled"
         for other in (reference, expected):
             assert np.max(np.abs(found.tau - other(state.q, state.v).tau)) < TORQUE
 
 
-def test_a_new_controller_has_run_a_tick_before_the_loop_does(monkeypatch):
-    robot = judges.load("go2")
+def test_a_new_controller_has_run_a_tick_before_the_loop_does(monkeypatch, go2):
     warmed: list[CompiledTick] = []
     monkeypatch.setattr(CompiledTick, "warm_up", lambda self: warmed.append(self))
-    controller = fb.WholeBodyController(robot, judges.stance(robot), [judges.KeepStill()])
+    controller = fb.WholeBodyController(go2, judges.stance(go2), [judges.KeepStill()])
     assert controller.backend == "compiled" and warmed == [controller.compiled]
-    assert controller.replace(tasks=fb.standing_tasks(robot.standing())).backend == "compiled"
+    assert controller.replace(tasks=fb.standing_tasks(go2.standing())).backend == "compiled"
     assert warmed == [controller.compiled], "a replaced controller's tick was compiled before"

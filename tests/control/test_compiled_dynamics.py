@@ -9,7 +9,6 @@ import pytest
 
 import floatbase as fb
 from floatbase.control.tick import dynamics
-from floatbase.robots import Robot
 
 ROUNDING = 1e-12  # relative to the largest entry
 LINK = """<link name="l{0}"><inertial><mass value="{0}.5"/><origin xyz="0.1 -0.2 0.2" rpy="1 2 3"/>
@@ -24,7 +23,7 @@ JOINTS = (
 )  # fmt: skip
 
 
-def own_robot(floating: bool) -> Robot:
+def own_robot(floating: bool) -> fb.Robot:
     """Return two branches of all kinds of joints, with rotors and tilted gravity."""
     joints = [JOINT.format(i, *each) for i, each in enumerate(JOINTS, 1)]
     links = [LINK.format(i) for i in range(len(JOINTS) + 1)]

@@ -17,8 +17,6 @@ import floatbase as fb
 from floatbase.control import JointLimits
 from floatbase.dynamics import fixed_frame, moving_frame
 from floatbase.errors import InfeasibleError, SolverError, UnknownNameError
-from floatbase.qp import solve
-from floatbase.robots import State
 
 # of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on
 # anymal_kinova
@@ -27,7 +25,7 @@ SAG = 2e-3
 ASIDE = 5e-3
 
 
-def cases(name: str, n: int) -> list[State]:
+def cases(name: str, n: int) -> list[fb.State]:
     """Return states, half of them near standing, half far away with many active inequalities."""
     return judges.states(name, n - n // 2, 0.08) + judges.states(name, n // 2, 0.3)
 
@@ -37,7 +35,7 @@ def test_daqp_finds_the_optimum_that_cvxpy_finds(name):
     controller, n_active, n = judges.controller_of(name), 0, 40 if name == "go2" else 20
     for state in cases(name, n):
         qp = controller.qp(state)
-        found, judge = solve(qp), solve(qp, "cvxpy")
+        found, judge = fb.solve(qp), fb.solve(qp, "cvxpy")
         prices = np.sum(judge.inequality_multipliers) + np.sum(np.abs(judge.equality_multipliers))
         r, gap = judge.residuals, abs(found.objective - judge.objective)
         worth = max(r.inequality, r.equality) * prices + r.complementarity * len(qp.G)
@@ -137,21 +135,19 @@ def test_an_arm_bolted_to_the_ground_gets_computed_torque():
         assert np.allclose(controller(state.q, state.v).tau, expected, atol=1e-5)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(backend):
+def test_turned_by_half_a_facet_the_strong_and_the_weak_direction_change_places(backend, go2):
     """An inner pyramid gives μ along its edges and μ cos 45° in the middle of its sides.
 
     Without rotation, one of the sides faces forwards.
     """
-    robot = judges.load("go2")
-    state, contacts = robot.standing(), fb.Contacts.points(robot, mu=0.3)
+    state, contacts = go2.standing(), fb.Contacts.points(go2, mu=0.3)
     others = fb.standing_tasks(state)[1:]
 
     def reached(direction: float, rotation: float) -> float:
         towards = np.array([np.cos(direction), np.sin(direction), 0.0])
         wish = fb.CoMTask(state.com, acceleration=4.0 * towards)
         options = {"facet_rotation": rotation, "backend": backend}
-        controller = fb.WholeBodyController(robot, contacts, [wish, *others], **options)
+        controller = fb.WholeBodyController(go2, contacts, [wish, *others], **options)
         f = controller(state.q, state.v).forces.reshape(-1, 3).sum(axis=0)
         return float(f @ towards / f[2])
 
@@ -167,8 +163,8 @@ def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled():
     Inner polyhedra of n and 2 n facets have different edges, so neither contains the other.
     """
 
-    def cost(state: State, n: int, **options: object) -> float:
-        return solve(judges.controller_of("go2", facets=n, **options).qp(state)).objective
+    def cost(state: fb.State, n: int, **options: object) -> float:
+        return fb.solve(judges.controller_of("go2", facets=n, **options).qp(state)).objective
 
     for state in judges.states("go2", 5, 0.3):
         outside = [cost(state, n, inner_approximation=False) for n in (4, 8, 16, 32)]
@@ -179,11 +175,10 @@ def test_outer_facets_allow_more_than_inner_ones_and_less_when_doubled():
         assert inside[-1] - outside[-1] <= 0.1 * (inside[0] - outside[0]) + slack
 
 
-def test_normal_forces_are_along_the_normals_of_tilted_ground():
-    robot = judges.load("go2")
+def test_normal_forces_are_along_the_normals_of_tilted_ground(go2):
     normals = judges.random_normals(4, 1)
-    contacts = fb.Contacts.points(robot, mu=0.4, normals=normals)
-    controller = judges.pair(robot, contacts, min_normal_force=2.0)[0]
+    contacts = fb.Contacts.points(go2, mu=0.4, normals=normals)
+    controller = judges.pair(go2, contacts, min_normal_force=2.0)[0]
     for state in judges.states("go2", 5, 0.2):
         forces = controller(state.q, state.v).forces.reshape(4, 3)
         pressing = np.sum(forces * normals, axis=1)
@@ -208,28 +203,26 @@ def test_torque_limits_are_the_robots_or_those_given_or_none():
     assert names == [f"torque limit {robot.joint_names[3]} {side}" for side in ("upper", "lower")]
 
 
-def test_regularisation_is_added_where_it_is_missing_and_shown():
-    robot = judges.load("go2")
-    contacts, tasks = fb.Contacts.points(robot), fb.standing_tasks(robot.standing())
-    added = fb.WholeBodyController(robot, contacts, tasks).tasks[len(tasks) :]
+def test_regularisation_is_added_where_it_is_missing_and_shown(go2):
+    contacts, tasks = fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
+    added = fb.WholeBodyController(go2, contacts, tasks).tasks[len(tasks) :]
     assert {type(task) for task in added} == {fb.ForceTask, fb.TorqueTask}
     own = [*tasks, fb.ForceTask(weight=1e-3), fb.TorqueTask(weight=1e-3)]
-    assert fb.WholeBodyController(robot, contacts, own).tasks == tuple(own)
+    assert fb.WholeBodyController(go2, contacts, own).tasks == tuple(own)
 
 
-def test_a_controller_is_replaced_rather_than_changed():
-    robot = judges.load("go2")
+def test_a_controller_is_replaced_rather_than_changed(go2):
     limits = {"facets": 8, "inner_approximation": False, "min_normal_force": 3.0}
     controller = judges.controller_of("go2", torque_limits=20.0, solver="cvxpy", **limits)
     three = controller.replace(contacts=controller.contacts.without("FL_foot"))
     assert three.contacts.names == ("FR_foot", "RL_foot", "RR_foot")
-    assert controller.contacts.names == tuple(foot.frame for foot in robot.feet)
+    assert controller.contacts.names == tuple(foot.frame for foot in go2.feet)
     assert three.tasks == controller.tasks
     for field in ("facets", "inner_approximation", "min_normal_force"):
         assert getattr(three.limits, field) == getattr(controller.limits, field)
     assert np.array_equal(three.limits.torque_limits, controller.limits.torque_limits)
     assert three.solver == "cvxpy"
-    other = controller.replace(tasks=[fb.PostureTask(robot.standing().q)])
+    other = controller.replace(tasks=[fb.PostureTask(go2.standing().q)])
     assert [type(task) for task in other.tasks] == [fb.PostureTask, fb.ForceTask, fb.TorqueTask]
 
 
@@ -249,50 +242,44 @@ def test_feet_whose_rows_are_inconsistent_with_a_velocity_are_kept_as_nearly_as_
 # infeasible ---------------------------------------------------------------------------------------
 
 
-def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict():
+def test_an_impossible_demand_names_a_smallest_set_of_rows_in_conflict(standing):
     controller = judges.controller_of("go2", min_normal_force=500.0)
-    state = judges.load("go2").standing()
     with pytest.raises(InfeasibleError) as caught:
-        controller(state.q, state.v)
+        controller(standing.q, standing.v)
     assert any(row.endswith("normal force") for row in caught.value.constraints)
     assert any(row.startswith("torque limit") for row in caught.value.constraints)
     for row in caught.value.constraints:  # each by its owner, in the line of its kind
         assert row.owner in row and row.owner in str(caught.value)
-    assert judges.is_smallest_conflict(controller.qp(state), caught.value.constraints)
+    assert judges.is_smallest_conflict(controller.qp(standing), caught.value.constraints)
 
 
 # arguments ----------------------------------------------------------------------------------------
 
 
-def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands():
-    robot = judges.load("go2")
-    feet = fb.Contacts.points(robot, frames=["FL_foot", "RR_foot"])
+def test_friction_rows_lie_on_the_forces_of_their_points_wherever_a_constraint_stands(go2):
+    feet = fb.Contacts.points(go2, frames=["FL_foot", "RR_foot"])
     bolts = fb.Contacts([fixed_frame("base")])
-    tasks = fb.standing_tasks(robot.standing())
-    state = robot.random_state(3, 0.05)
-    first = fb.WholeBodyController(robot, bolts + feet, tasks)(state.q, state.v)
-    last = fb.WholeBodyController(robot, feet + bolts, tasks)(state.q, state.v)
+    tasks = fb.standing_tasks(go2.standing())
+    state = go2.random_state(3, 0.05)
+    first = fb.WholeBodyController(go2, bolts + feet, tasks)(state.q, state.v)
+    last = fb.WholeBodyController(go2, feet + bolts, tasks)(state.q, state.v)
     assert np.allclose(first.tau, last.tau, atol=1e-6)
     assert np.allclose(first.forces, np.roll(last.forces, 6), atol=1e-5)
 
 
-def test_inconsistent_motions_are_named_and_not_averaged():
-    robot = judges.load("go2")
+def test_inconsistent_motions_are_named_and_not_averaged(go2, standing):
     drive = moving_frame("FL_foot", lambda t: np.array([0.0, 0.0, 5.0 * t]))
-    controller = judges.pair(robot, fb.Contacts.points(robot) + fb.Contacts([drive]))[0]
-    state = robot.standing()
+    controller = judges.pair(go2, fb.Contacts.points(go2) + fb.Contacts([drive]))[0]
     with raises(InfeasibleError, "motion FL_foot z", "motion drive of FL_foot row 2") as e:
-        controller(state.q, state.v, 1.0)
+        controller(standing.q, standing.v, 1.0)
     assert e.value.constraints == ("motion FL_foot z", "motion drive of FL_foot row 2")
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend):
-    robot = judges.load("talos")
+def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend, talos):
     controller = judges.controller_of("talos", backend=backend)
-    command = controller(robot.standing().q, np.zeros(robot.nv))
+    command = controller(talos.standing().q, np.zeros(talos.nv))
     left, right = (command.force(name) for name in controller.contacts.names)
-    assert np.allclose(left + right, [0.0, 0.0, robot.weight], atol=SAG * robot.weight)
+    assert np.allclose(left + right, [0.0, 0.0, talos.weight], atol=SAG * talos.weight)
     assert np.allclose(left, command.forces[:12].reshape(4, 3).sum(axis=0))
     with raises(UnknownNameError, "left_sole_lnk", "left_sole_link"):
         command.force("left_sole_lnk")
@@ -300,30 +287,27 @@ def test_a_command_gives_the_force_of_a_foot_and_prints_in_one_line(backend):
     assert backend in repr(command)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_an_infeasible_tick_is_answered_with_soft_constraints_on_request(backend):
-    robot = judges.load("talos")
-    contacts, tasks = judges.stance(robot), fb.standing_tasks(robot.standing())
-    weak = {"torque_limits": 0.2 * robot.torque_limits, "min_normal_force": 200.0}
+def test_an_infeasible_tick_is_answered_with_soft_constraints_on_request(backend, talos):
+    contacts, tasks = judges.stance(talos), fb.standing_tasks(talos.standing())
+    weak = {"torque_limits": 0.2 * talos.torque_limits, "min_normal_force": 200.0}
     weak["backend"] = backend
-    moving = robot.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(robot.nv - 4)])
-    soft = fb.WholeBodyController(robot, contacts, tasks, normal_force_weight=1e4, **weak)
+    moving = talos.standing().replace(v=np.r_[0.0, 3.0, 0.0, 3.0, np.zeros(talos.nv - 4)])
+    soft = fb.WholeBodyController(talos, contacts, tasks, normal_force_weight=1e4, **weak)
     expected = soft(moving.q, moving.v)
     assert not expected.softened
-    made = fb.WholeBodyController(robot, contacts, tasks, on_infeasible="soften", **weak)
+    made = fb.WholeBodyController(talos, contacts, tasks, on_infeasible="soften", **weak)
     for each in (made, copy.deepcopy(made), made.replace(tasks=tasks)):
         command = each(moving.q, moving.v)
         assert command.softened and np.array_equal(command.tau, expected.tau)
     with pytest.raises(InfeasibleError):
-        fb.WholeBodyController(robot, contacts, tasks, **weak)(moving.q, moving.v)
+        fb.WholeBodyController(talos, contacts, tasks, **weak)(moving.q, moving.v)
     with raises(UnknownNameError, "on_infeasible", "soft", "soften"):
-        fb.WholeBodyController(robot, contacts, tasks, on_infeasible="soft")
+        fb.WholeBodyController(talos, contacts, tasks, on_infeasible="soft")
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_robot_of_any_mass_plans_forces_that_carry_it_and_withstands_a_push(name):
+@pytest.mark.parametrize("robot", ["go2", "talos"], indirect=True)
+def test_a_robot_of_any_mass_plans_forces_that_carry_it_and_withstands_a_push(robot):
     """With weights that do not follow the robot's, 480 kg planned 0.946 of it, and 5 t fell."""
-    robot = judges.load(name)
     for mass in (0.01, 80.0, 5000.0):
         factor = mass / robot.mass
         scaled = robot.with_scaled_mass(factor)
@@ -381,11 +365,10 @@ def test_a_control_step_in_a_wild_state_ends_soon_and_names_what_answered(backen
     assert np.median(seconds) < 0.1
 
 
-def test_a_conflict_that_is_read_later_survives_a_pickle():
-    robot = judges.load("go2")
+def test_a_conflict_that_is_read_later_survives_a_pickle(go2):
     controller = judges.controller_of("go2", min_normal_force=500.0)
     with pytest.raises(InfeasibleError) as caught:
-        controller(robot.standing().q, np.zeros(robot.nv))
+        controller(go2.standing().q, np.zeros(go2.nv))
     caught.value.add_note("at state 3")
     copied = pickle.loads(pickle.dumps(caught.value))
     assert copied.__notes__ == ["at state 3"]

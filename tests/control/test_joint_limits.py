@@ -11,7 +11,6 @@ from messages import raises
 import floatbase as fb
 from floatbase.control import JointLimits, Limits, LinearInequality, build_qp
 from floatbase.errors import InfeasibleError, InputError
-from floatbase.qp import QP
 from floatbase.robots import Robot, State
 
 PERIODS = (1e-3, 2e-3, 4e-3)
@@ -145,24 +144,23 @@ def test_no_joint_passes_its_limit_in_mujoco(name, joints):
     assert beyond > OVERSHOOT * span[joints[-1]] or speed > limits.velocity[joints[-1]]
 
 
-def test_active_limits_are_named_for_joint_kind_and_side():
-    robot = judges.load("go2")
-    joint = robot.joint_names.index("FL_calf_joint")
-    limits = JointLimits.of(robot, weight=None)
+def test_active_limits_are_named_for_joint_kind_and_side(go2):
+    joint = go2.joint_names.index("FL_calf_joint")
+    limits = JointLimits.of(go2, weight=None)
     free = fb.Contacts.none()
     for kind, q, v, changes in (
         ("position", limits.upper[joint] - 1e-4, 0.0, {}),
         ("velocity", -1.5, limits.velocity[joint], {}),
         ("acceleration", -1.5, 0.0, {"acceleration": np.full(12, 20.0)}),
     ):
-        state = robot.standing()
-        configuration, speeds = np.array(state.q), np.zeros(robot.nv)
+        state = go2.standing()
+        configuration, speeds = np.array(state.q), np.zeros(go2.nv)
         configuration[7 + joint], speeds[6 + joint] = q, v
         target = np.array(configuration)
         target[7 + joint] += 1.0
         task = fb.PostureTask(target, kp=900.0, kd=0.0)
         changed = replace(limits, **changes)
-        controller = fb.WholeBodyController(robot, free, [task], joint_limits=changed)
+        controller = fb.WholeBodyController(go2, free, [task], joint_limits=changed)
         active = controller(configuration, speeds).active
         row = next(row for row in active if row.owner == "FL_calf_joint")
         assert row == f"FL_calf_joint {kind} upper" and row.kind == f"upper {kind} limit"
@@ -171,18 +169,15 @@ def test_active_limits_are_named_for_joint_kind_and_side():
 # soft ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_impossible_soft_constraints_are_violated_and_named(backend):
+def test_impossible_soft_constraints_are_violated_and_named(backend, go2, standing):
     """An impossible inequality, a squeezed force and a joint beyond its limit, all at once."""
-    robot = judges.load("go2")
-    standing = robot.standing()
     q = np.array(standing.q)
-    at = 7 + robot.joint_names.index("FL_calf_joint")
-    q[at] = JointLimits.of(robot).upper[at - 7] + 0.01
-    rise = LinearInequality("rise", "qdd", (-np.eye(robot.nv)[2:3], [-200.0]))
+    at = 7 + go2.joint_names.index("FL_calf_joint")
+    q[at] = JointLimits.of(go2).upper[at - 7] + 0.01
+    rise = LinearInequality("rise", "qdd", (-np.eye(go2.nv)[2:3], [-200.0]))
     squeeze = {"min_normal_force": 60.0, "max_normal_force": 40.0}
     options = {"inequalities": [rise], "backend": backend, **squeeze}
-    limits = JointLimits.of(robot, weight=None)
+    limits = JointLimits.of(go2, weight=None)
     hard = judges.controller_of("go2", joint_limits=limits, **options)
     with pytest.raises(InfeasibleError):
         hard(q, standing.v)
@@ -192,21 +187,20 @@ def test_impossible_soft_constraints_are_violated_and_named(backend):
     for foot in soft.contacts.names:  # at most 40 N and at least 60 N
         amounts = [x for name, x in command.violations.items() if name.endswith(foot)]
         assert sum(amounts) == pytest.approx(20.0, abs=1e-6)
-    least, largest = soft.limits.joint_limits.bounds(q[7:], np.zeros(robot.d))
+    least, largest = soft.limits.joint_limits.bounds(q[7:], np.zeros(go2.d))
     violated = (command.qdd[6:] > largest + 1e-6) | (command.qdd[6:] < least - 1e-6)
-    named = {name.owner for name in command.violations if name.owner in robot.joint_names}
-    assert named == {robot.joint_names[i] for i in np.flatnonzero(violated)}
-    assert np.all(np.abs(command.tau) <= robot.torque_limits + 1e-6)
-    eom = fb.equations_of_motion(State(robot, q), judges.stance(robot))
+    named = {name.owner for name in command.violations if name.owner in go2.joint_names}
+    assert named == {go2.joint_names[i] for i in np.flatnonzero(violated)}
+    assert np.all(np.abs(command.tau) <= go2.torque_limits + 1e-6)
+    eom = fb.equations_of_motion(State(go2, q), judges.stance(go2))
     assert np.allclose(eom.A @ command.qdd, eom.b, atol=1e-6)  # the contacts still hold
 
 
-def test_a_soft_force_bound_holds_while_it_can():
-    robot = judges.load("go2")
-    standing, contacts = robot.standing(), judges.stance(robot)
+def test_a_soft_force_bound_holds_while_it_can(go2):
+    standing, contacts = go2.standing(), judges.stance(go2)
     bounds = {"FL_foot": lambda t: 10.0 + 500.0 * t}
     options = {"max_normal_force": {"FR_foot": 5.0}, "min_normal_force": bounds}
-    for controller in judges.pair(robot, contacts, normal_force_weight=1e3, **options):
+    for controller in judges.pair(go2, contacts, normal_force_weight=1e3, **options):
         for t, holds in ((0.0, True), (1.0, False)):
             command = controller(standing.q, standing.v, t)
             force = command.force("FL_foot")[2]
@@ -217,70 +211,65 @@ def test_a_soft_force_bound_holds_while_it_can():
                 assert command.violations[name] == pytest.approx(510.0 - force, abs=1e-6)
 
 
-def test_limits_are_the_robots_by_default_and_can_be_off():
-    robot = judges.load("go2")
+def test_limits_are_the_robots_by_default_and_can_be_off(go2):
     default = judges.controller_of("go2")
-    assert np.array_equal(default.limits.joint_limits.upper, robot.model.upperPositionLimit[7:])
-    kinds = {name.kind for name in default.qp(robot.standing()).inequality_names}
+    assert np.array_equal(default.limits.joint_limits.upper, go2.model.upperPositionLimit[7:])
+    kinds = {name.kind for name in default.qp(go2.standing()).inequality_names}
     assert "upper position limit" in kinds
     off = judges.controller_of("go2", joint_limits=None)
     assert off.limits.joint_limits is None
-    kinds = {name.kind for name in off.qp(robot.standing()).inequality_names}
+    kinds = {name.kind for name in off.qp(go2.standing()).inequality_names}
     assert not kinds & {"upper position limit", "lower velocity limit"}
 
 
-def test_braking_follows_the_torque_limits_of_the_controller():
-    robot = judges.load("go2")
+def test_braking_follows_the_torque_limits_of_the_controller(go2):
     weak = judges.controller_of("go2", torque_limits=2.0).limits.joint_limits
-    assert np.array_equal(weak.braking, JointLimits.of(robot, torque_limits=2.0).braking)
-    posture = np.array(robot.posture)
-    inertia = pin.crba(robot.model, robot.model.createData(), posture).diagonal()[6:]
+    assert np.array_equal(weak.braking, JointLimits.of(go2, torque_limits=2.0).braking)
+    posture = np.array(go2.posture)
+    inertia = pin.crba(go2.model, go2.model.createData(), posture).diagonal()[6:]
     assert np.allclose(weak.braking, np.minimum(0.5 * 2.0 / inertia, 300.0))
-    limits = Limits.of(robot, torque_limits=2.0, facets=8)
+    limits = Limits.of(go2, torque_limits=2.0, facets=8)
     assert limits.facets == 8 and np.array_equal(limits.joint_limits.braking, weak.braking)
-    assert np.array_equal(limits.torque_limits, np.full(robot.d, 2.0))
-    assert Limits.of(robot, joint_limits=None).joint_limits is None
+    assert np.array_equal(limits.torque_limits, np.full(go2.d, 2.0))
+    assert Limits.of(go2, joint_limits=None).joint_limits is None
     with raises(InputError, "joint_limits", "Limits.of"):
-        Limits(robot.torque_limits, joint_limits="robot")
+        Limits(go2.torque_limits, joint_limits="robot")
 
 
-def test_soft_bounds_have_rows_only_where_there_are_bounds():
-    robot = judges.load("go2")
+def test_soft_bounds_have_rows_only_where_there_are_bounds(go2):
     for bounds, rows in (
         ({}, set()),
         ({"min_normal_force": {"FL_foot": 0.0, "FR_foot": 5.0}}, {"smallest FR_foot"}),
         ({"max_normal_force": {"FL_foot": 0.0}}, {"largest FL_foot"}),
         ({"min_normal_force": {"RL_foot": lambda t: 0.0}}, {"smallest RL_foot"}),
     ):
-        both = judges.pair(robot, judges.stance(robot), normal_force_weight=10.0, **bounds)
-        qp = both[0].qp(robot.standing())
+        both = judges.pair(go2, judges.stance(go2), normal_force_weight=10.0, **bounds)
+        qp = both[0].qp(go2.standing())
         names = {name for name in qp.inequality_names if name.startswith("soft normal force")}
         assert names == {f"soft normal force {row}" for row in rows}
-        assert judges.difference(*both, robot.standing()) < judges.agreement(robot)
+        assert judges.difference(*both, go2.standing()) < judges.agreement(go2)
 
 
-def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind():
+def test_a_saturated_row_of_large_weight_leaves_no_rounding_behind(go2):
     """Rows of weight 1e8 that are violated only during the search leave their penalty behind."""
-    robot = judges.load("go2")
     rng = np.random.default_rng(4)
     for _ in range(10):
-        G, h = rng.normal(size=(6, robot.nv)), rng.normal(0.0, 20.0, 6)
+        G, h = rng.normal(size=(6, go2.nv)), rng.normal(0.0, 20.0, 6)
         rows = LinearInequality("heavy", "qdd", (G, h), weight=1e8)
         light = LinearInequality("light", "qdd", (-G[:3], 5.0 - h[:3]), weight=1.0)
-        both = judges.pair(robot, judges.stance(robot), inequalities=[rows, light])
-        state = robot.random_state(int(rng.integers(1000)), 0.1)
-        assert judges.difference(*both, state) < 1e-6 * robot.torque_limits.max()
+        both = judges.pair(go2, judges.stance(go2), inequalities=[rows, light])
+        state = go2.random_state(int(rng.integers(1000)), 0.1)
+        assert judges.difference(*both, state) < 1e-6 * go2.torque_limits.max()
 
 
-def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_arrays_of_the_problem():
+def test_another_solver_finds_the_torques_beyond_a_soft_limit_from_the_arrays_of_the_problem(go2):
     cp = pytest.importorskip("cvxpy")
-    robot = judges.load("go2")
-    state, limits = robot.standing(), JointLimits.of(robot)
+    state, limits = go2.standing(), JointLimits.of(go2)
     upper = np.array(limits.upper)
     upper[2] = state.q[9] - 0.1
     controller = judges.controller_of("go2", joint_limits=replace(limits, upper=upper))
 
-    def torques(qp: QP) -> np.ndarray:
+    def torques(qp: fb.QP) -> np.ndarray:
         """Return the torques that Clarabel finds for the arrays of a problem."""
         x = cp.Variable(qp.n)
         cost = 0.5 * cp.quad_form(x, cp.psd_wrap(qp.H)) + qp.g @ x

@@ -11,7 +11,7 @@ import pytest
 from messages import missing, raises, refused
 
 import floatbase as fb
-from floatbase.control import AnalyticController, Limits, LinearInequality
+from floatbase.control import AnalyticController, LinearInequality
 from floatbase.errors import InputError, UnknownNameError
 
 GO2, SOLO = judges.load("go2"), judges.load("solo12")
@@ -55,17 +55,13 @@ def analytic(**swap: object) -> AnalyticController:
     "case",
     [
         (lambda: controller(facets=2), "facets", 2, 3),
-        (lambda: controller(min_normal_force=-1.0), "min_normal_force", -1),
         (lambda: controller(min_normal_force={"FL_foot": lambda t: -1.0}), "min_normal_force",
             "FL_foot", -1),
-        (lambda: controller(max_normal_force=-1.0), "max_normal_force", -1),
         (lambda: controller(max_normal_force={"FL_foot": -1.0}), "max_normal_force", "FL_foot",
             -1),
         (lambda: controller(max_normal_force=lambda t: 1.0), "max_normal_force"),
-        (lambda: controller(max_normal_force=[1.0, 2.0]), "max_normal_force", 1, 2),
         (lambda: controller(max_normal_force={"FL_foot": lambda: 1.0}), "max_normal_force",
             "FL_foot"),
-        (lambda: Limits(np.ones(12), min_normal_force=-50.0), "min_normal_force", -50),
         (lambda: controller(torque_limits=[1.0, 2.0]), "torque_limits", 12, 2),
         (lambda: controller(torque_limits=0.0), "torque_limits", 12, 0),
         (lambda: controller(inequalities=rows("tau", 12)), "inequalities", "LinearInequality"),
@@ -98,7 +94,6 @@ def analytic(**swap: object) -> AnalyticController:
         (lambda: controller(modify_qp=lambda qp, eom: replace(qp, blocks={})), "modify_qp",
             "blocks"),
         (lambda: fb.WholeBodyController(GO2, CONTACTS, fb.CoMTask(UP)), "tasks", "CoMTask"),
-        (lambda: controller().qp(SOLO.standing()), "solo12", "go2"),
         (lambda: controller(fb.PostureTask(np.zeros(5))), "q", 5, 19),
         (lambda: controller(fb.ForceTask(np.zeros(3))), "target", 3, 12),
         (lambda: controller(fb.TorqueTask(np.zeros(3))), "target", 3, 12),
@@ -114,26 +109,16 @@ def analytic(**swap: object) -> AnalyticController:
             "base"),
         (lambda: controller(fb.PostureTask(STATE.q, UP)), "velocity", 3, 12),
         (lambda: fb.CoMTask(lambda: UP), "position", "t"),
-        (lambda: fb.CoMTask(UP, kp=UP), "kp", 3),
-        (lambda: fb.CoMTask(UP, kp=-1.0), "kp", -1),
         (lambda: fb.CoMTask(UP, lambda t: UP), "velocity", "position"),
         (lambda: fb.CoMTask(lambda t: UP, UP), "velocity", "position"),
-        (lambda: fb.FrameTask("base", UP, kd=-1.0), "kd", "base", -1),
         (lambda: fb.PostureTask(STATE.q[None]), "q", 1, 19),
-        (lambda: fb.PostureTask(STATE.q, weight=-1.0), "weight", -1),
-        (lambda: fb.ForceTask(weight=-1.0), "weight", -1),
         (lambda: fb.OrientationTask("base", lambda t, f: UP), "rotation", "base", "f"),
-        (lambda: fb.OrientationTask("base", np.eye(2)), "rotation", "base", 2, 3),
         (lambda: fb.OrientationTask("base", 2 * np.eye(3)), "rotation", "base"),
         (lambda: fb.OrientationTask("base", np.diag([1, 1, -1])), "rotation", "base"),
         (lambda: controller()(1.1 * STATE.q, STATE.v), "q", 1.1),
-        (lambda: analytic(com=[0.0, 0.0]), "com", 2, 3),
-        (lambda: analytic(kp=-1.0), "kp", -1),
         (lambda: analytic(kd=0.0), "kd", 0),
-        (lambda: analytic(alpha=-0.1), "alpha", -0.1),
         (lambda: analytic(bias_weight=0.0), "bias_weight", 0),
         (lambda: analytic(posture_weight=0.0), "posture_weight", 0),
-        (lambda: analytic(state=SOLO.standing()), "state", "go2"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused_by_name(case):

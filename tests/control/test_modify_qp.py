@@ -11,13 +11,12 @@ import floatbase as fb
 from floatbase import _blas
 from floatbase.behaviours import Gait, Walk
 from floatbase.dynamics import EquationsOfMotion
-from floatbase.qp import QP
 
 GO2 = judges.load("go2")
 PARTS = ("H", "g", "A", "b", "G", "h")
 
 
-def with_even_knees(qp: QP, eom: EquationsOfMotion) -> QP:
+def with_even_knees(qp: fb.QP, eom: EquationsOfMotion) -> fb.QP:
     """Add a row that couples torques: both front knees have the same torque."""
     first, second = (eom.robot.joint_names.index(f"{leg}_calf_joint") for leg in ("FL", "FR"))
     row = np.zeros((1, qp.n))
@@ -26,7 +25,7 @@ def with_even_knees(qp: QP, eom: EquationsOfMotion) -> QP:
     return replace(qp, A=A, b=b, equality_names=names)
 
 
-def unchanged(qp: QP, eom: EquationsOfMotion) -> QP:
+def unchanged(qp: fb.QP, eom: EquationsOfMotion) -> fb.QP:
     return qp
 
 
@@ -45,24 +44,23 @@ def test_it_changes_the_problem_that_is_solved_and_no_other_is():
     assert all(np.array_equal(getattr(same, part), getattr(before, part)) for part in PARTS)
 
 
-def test_modify_qp_uses_the_reference_backend_and_the_reason_names_modify_qp():
-    state = GO2.standing()
+def test_modify_qp_uses_the_reference_backend_and_the_reason_names_modify_qp(standing):
     even = controller(modify_qp=with_even_knees)
     assert even.backend == "reference" and "modify_qp" in even.backend_reason
-    assert even(state.q, state.v).backend == "reference"
+    assert even(standing.q, standing.v).backend == "reference"
     for other in (
         even.replace(contacts=even.contacts.without("FL_foot")),
         pickle.loads(pickle.dumps(even)),
         controller(modify_qp=with_even_knees, contact_weight=1e4),
     ):
         assert other.backend == "reference"
-        assert other.qp(state).equality_names[-1] == "even knees"
+        assert other.qp(standing).equality_names[-1] == "even knees"
 
 
 def test_a_walk_hands_it_to_the_controllers_of_all_stances():
     seen = set()
 
-    def watch(qp: QP, eom: EquationsOfMotion) -> QP:
+    def watch(qp: fb.QP, eom: EquationsOfMotion) -> fb.QP:
         seen.add(eom.contacts.names)
         return qp
 
@@ -75,7 +73,7 @@ def test_a_walk_hands_it_to_the_controllers_of_all_stances():
 def test_a_reference_step_uses_one_blas_thread_and_leaves_the_number_as_it_was():
     threads, inside = getattr(_blas.LIBRARY, _blas.SETTER.replace("set", "get")), []
 
-    def read(qp: QP, eom: EquationsOfMotion) -> QP:
+    def read(qp: fb.QP, eom: EquationsOfMotion) -> fb.QP:
         inside.append(threads())
         if len(inside) > 2:
             raise ValueError

@@ -15,10 +15,9 @@ from floatbase.control import JointLimits, _priorities, build_qp
 from floatbase.errors import InfeasibleError, InputError, SolverError
 from floatbase.objectives import AngularMomentumTask, AxisTask
 from floatbase.qp.solve import Budget
-from floatbase.robots import Robot, State
 
 
-def levels_of(robot: Robot, state: State) -> list[list[object]]:
+def levels_of(robot: fb.Robot, state: fb.State) -> list[list[object]]:
     """Return three levels: base orientation and height, a far centre of mass, and posture."""
     com = state.com + [0.3, 0.1, -0.05]
     return [
@@ -28,11 +27,10 @@ def levels_of(robot: Robot, state: State) -> list[list[object]]:
     ]
 
 
-def test_levels_are_answered_by_the_reference_backend():
-    robot = judges.load("go2")
-    contacts, state = judges.stance(robot), robot.standing()
-    levels = levels_of(robot, state)
-    controller = fb.WholeBodyController(robot, contacts, levels)
+def test_levels_are_answered_by_the_reference_backend(go2):
+    contacts, state = judges.stance(go2), go2.standing()
+    levels = levels_of(go2, state)
+    controller = fb.WholeBodyController(go2, contacts, levels)
     assert controller.backend == "reference" and "priorit" in controller.backend_reason
     assert controller.problem.level_sizes == (1, 1, 3)
     command = controller(state.q, state.v)
@@ -48,36 +46,34 @@ def test_levels_are_answered_by_the_reference_backend():
     assert lifted.problem.level_sizes == (1, 1, 3)
     lifted(state.q, state.v)
     with raises(InputError, "backend"):
-        fb.WholeBodyController(robot, contacts, levels, backend="compiled")
+        fb.WholeBodyController(go2, contacts, levels, backend="compiled")
     for wrong in ([levels[0], levels[1][0]], [[], levels[0]]):
         with raises(InputError, "level"):
-            fb.WholeBodyController(robot, contacts, wrong)
+            fb.WholeBodyController(go2, contacts, wrong)
     with raises(InputError, "modify_qp"):
-        fb.WholeBodyController(robot, contacts, levels, modify_qp=lambda qp, eom: qp)
+        fb.WholeBodyController(go2, contacts, levels, modify_qp=lambda qp, eom: qp)
 
 
-def test_levels_with_soft_contacts_and_soft_limits():
-    robot = judges.load("go2")
-    contacts, state = judges.stance(robot), robot.standing()
-    levels, options = levels_of(robot, state), {"on_infeasible": "soften"}
-    controller = fb.WholeBodyController(robot, contacts, levels, min_normal_force=500.0, **options)
+def test_levels_with_soft_contacts_and_soft_limits(go2):
+    contacts, state = judges.stance(go2), go2.standing()
+    levels, options = levels_of(go2, state), {"on_infeasible": "soften"}
+    controller = fb.WholeBodyController(go2, contacts, levels, min_normal_force=500.0, **options)
     command = controller(state.q, state.v)
     assert command.softened and command.violations
-    soft = fb.WholeBodyController(robot, contacts, levels_of(robot, state), contact_weight=1e4)
+    soft = fb.WholeBodyController(go2, contacts, levels_of(go2, state), contact_weight=1e4)
     assert soft.problem.level_sizes == (2, 1, 3)
     eom = fb.equations_of_motion(state, contacts)
     qdd = soft(state.q, state.v).qdd
     assert np.allclose(eom.A @ qdd, eom.b, atol=0.1)
 
 
-@pytest.mark.parametrize("name", ["go2", "solo12"])
-def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(name, monkeypatch):
+@pytest.mark.parametrize("robot", ["go2", "solo12"], indirect=True)
+def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(robot, monkeypatch):
     """A hundred times larger tolerance of rounding used to move torques by 1e-5 N·m."""
-    robot = judges.load(name)
     limits = JointLimits.of(robot, weight=None)
     tasks = levels_of(robot, robot.standing())
     controller = fb.WholeBodyController(robot, judges.stance(robot), tasks, joint_limits=limits)
-    for state in judges.states(name, 2, 0.05):
+    for state in judges.states(robot.name, 2, 0.05):
         levels = controller.problem.solve_levels(state)
         with monkeypatch.context() as patch:
             patch.setattr(_priorities, "FEASIBILITY_TOLERANCE", 1e-7)
@@ -87,7 +83,7 @@ def test_active_inequalities_of_a_level_are_exact_in_the_levels_after_it(name, m
         assert levels[1].multipliers.items() <= levels[-1].multipliers.items()
 
 
-def random_problem(name: str, seed: int) -> tuple[State, fb.WholeBodyController]:
+def random_problem(name: str, seed: int) -> tuple[fb.State, fb.WholeBodyController]:
     """Return a state and a controller with random tasks in two to four levels."""
     robot, rng = judges.load(name), np.random.default_rng([seed, len(name), ord(name[0])])
     standing, contacts = robot.standing(), judges.stance(robot, rng.uniform(0.2, 1.2))
@@ -147,7 +143,7 @@ def possible_gain(
     return float(length * (left @ left) - length**2 * curvature / 2.0)
 
 
-def check_levels(state: State, controller: fb.WholeBodyController) -> bool:
+def check_levels(state: fb.State, controller: fb.WholeBodyController) -> bool:
     """Check that no level can be improved; return whether there is a solution."""
     problem = controller.problem
     eom = fb.equations_of_motion(state, controller.contacts)
@@ -200,26 +196,24 @@ def test_no_level_of_random_problems_can_be_improved(name, n):
 
 
 @pytest.mark.parametrize("factor", [1e-16, 1e16])
-def test_a_factor_of_all_weights_changes_no_answer(factor):
+def test_a_factor_of_all_weights_changes_no_answer(factor, go2):
     """Only the ratios of the weights in a level count, also for which rows are zero."""
-    robot = judges.load("go2")
-    contacts, limits = judges.stance(robot), JointLimits.of(robot, weight=None)
-    levels = levels_of(robot, robot.standing())
+    contacts, limits = judges.stance(go2), JointLimits.of(go2, weight=None)
+    levels = levels_of(go2, go2.standing())
     scaled = [[replace(task, weight=factor * task.weight) for task in level] for level in levels]
     for state in judges.states("go2", 3, 0.05):
         x, y = (
-            fb.WholeBodyController(robot, contacts, each, joint_limits=limits)(state.q, state.v)
+            fb.WholeBodyController(go2, contacts, each, joint_limits=limits)(state.q, state.v)
             for each in (levels, scaled)
         )
         assert np.allclose(x.tau, y.tau, rtol=0.0, atol=1e-6 * np.max(np.abs(x.tau)))
 
 
-def test_tasks_of_one_name_can_be_in_several_levels():
-    robot = judges.load("go2")
-    contacts, state = judges.stance(robot), robot.random_state(1, 0.05)
+def test_tasks_of_one_name_can_be_in_several_levels(go2):
+    contacts, state = judges.stance(go2), go2.random_state(1, 0.05)
     first, second = (fb.OrientationTask("base", kp=kp) for kp in (100.0, 20.0))
-    tasks = [[first, first], [second], [fb.PostureTask(robot.standing().q)]]
-    controller = fb.WholeBodyController(robot, contacts, tasks)
+    tasks = [[first, first], [second], [fb.PostureTask(go2.standing().q)]]
+    controller = fb.WholeBodyController(go2, contacts, tasks)
     alone = controller.replace(tasks=[[first], tasks[-1]])
     assert np.allclose(
         controller(state.q, state.v).tau, alone(state.q, state.v).tau, rtol=0.0, atol=1e-6
@@ -229,10 +223,9 @@ def test_tasks_of_one_name_can_be_in_several_levels():
     assert len(rows) == 3 and {label.owner for label in rows} == {first.name}
 
 
-@pytest.mark.parametrize("name", ["g1", "talos"])
-def test_levels_of_a_pushed_humanoid_need_no_fallback(name):
+@pytest.mark.parametrize("robot", ["g1", "talos"], indirect=True)
+def test_levels_of_a_pushed_humanoid_need_no_fallback(robot):
     """Levels with small slopes, and rows that meet in one point, used to need `active_set`."""
-    robot = judges.load(name)
     state, contacts = robot.standing(), judges.stance(robot)
     first = [fb.CoMTask(state.com)], [fb.OrientationTask("base")], [fb.PostureTask(state.q)]
     for levels in (first, ([*first[0], *first[1]], first[2])):
@@ -246,26 +239,24 @@ def test_levels_of_a_pushed_humanoid_need_no_fallback(name):
             assert solved.count("daqp") >= len(solved) - 1
 
 
-def test_a_fallback_in_the_first_level_is_reported_by_the_last(monkeypatch):
-    robot = judges.load("go2")
-    state, solve = robot.standing(), _priorities.solve_in_step
+def test_a_fallback_in_the_first_level_is_reported_by_the_last(monkeypatch, go2):
+    state, solve = go2.standing(), _priorities.solve_in_step
     used = iter(["active_set", "daqp", "daqp"])
     monkeypatch.setattr(_priorities, "solve_in_step", lambda qp, _, b: solve(qp, next(used), b))
-    controller = fb.WholeBodyController(robot, judges.stance(robot), levels_of(robot, state))
+    controller = fb.WholeBodyController(go2, judges.stance(go2), levels_of(go2, state))
     assert controller(state.q, state.v).solver == "active_set"
 
 
-def test_a_level_without_an_answer_in_time_leaves_the_answer_of_the_levels_before(monkeypatch):
-    robot = judges.load("go2")
-    state, solve, left = robot.standing(), _priorities.solve_in_step, [1]
+def test_a_level_without_an_answer_in_time_leaves_the_answer_of_the_levels_before(monkeypatch, go2):
+    state, solve, left = go2.standing(), _priorities.solve_in_step, [1]
 
     def fail_after_one_level(qp, solver, budget):
         budget = budget if left.pop() else Budget(work=0.0)
         left.append(0)
         return solve(qp, solver, budget)
 
-    levels = levels_of(robot, state)
-    controller = fb.WholeBodyController(robot, judges.stance(robot), levels)
+    levels = levels_of(go2, state)
+    controller = fb.WholeBodyController(go2, judges.stance(go2), levels)
     first = controller.problem.solve_levels(state)[0]
     monkeypatch.setattr(_priorities, "solve_in_step", fail_after_one_level)
     command = controller(state.q, state.v)

@@ -27,7 +27,6 @@ def moving_controller(backend: str, **options: object) -> fb.WholeBodyController
     return fb.WholeBodyController(GO2, contacts, tasks, backend=backend, **options)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend):
     controller, rng = moving_controller(backend), np.random.default_rng(0)
     for state in judges.states("go2", 5, 0.05):
@@ -48,7 +47,6 @@ def test_an_array_of_targets_replaces_the_targets_of_the_tasks(backend):
         assert np.array_equal(controller(state.q, state.v, t).tau, unchanged.tau)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_targets_are_checked(backend):
     controller, state = moving_controller(backend), GO2.standing()
     good = controller.targets_at(0.0)
@@ -69,7 +67,6 @@ def infeasible(**options: object) -> tuple[fb.WholeBodyController, fb.State]:
     return controller, state.replace(v=v)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
 def test_an_attempt_returns_none_where_a_call_raises_an_error(backend):
     controller, state = infeasible(backend=backend)
     rest = TALOS.standing()

@@ -20,7 +20,6 @@ from floatbase.control import LinearInequality
 from floatbase.control.tick import tick
 from floatbase.dynamics import EquationsOfMotion, LinearConstraint, PointContact, RollingWheel
 from floatbase.errors import InfeasibleError, InputError
-from floatbase.robots import Robot, State
 
 
 @dataclass
@@ -77,7 +76,7 @@ FRAME_PARTS = ("frame_jacobian", "frame_velocity", "frame_drift", "point")
 HANDS = {"go2": "FL_foot", "solo12": "FL_FOOT", "talos": "gripper_left_base_link"}
 
 
-def stance(robot: Robot) -> fb.Contacts:
+def stance(robot: fb.Robot) -> fb.Contacts:
     """Return the contacts of the feet, without the one that serves as a hand."""
     contacts = judges.stance(robot)
     return contacts.without(HANDS[robot.name]) if HANDS[robot.name] in contacts.names else contacts
@@ -86,9 +85,8 @@ def stance(robot: Robot) -> fb.Contacts:
 # tasks --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", HANDS)
-def test_a_user_defined_task_does_what_the_same_built_in_task_does(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", HANDS, indirect=True)
+def test_a_user_defined_task_does_what_the_same_built_in_task_does(robot):
     at, frame, contacts = robot.standing(), HANDS[robot.name], stance(robot)
     hand = at.point(frame) + [0.0, 0.0, 0.05]
     others = [*fb.standing_tasks(at)[1:], fb.ForceTask(weight=1e-4)]
@@ -98,19 +96,18 @@ def test_a_user_defined_task_does_what_the_same_built_in_task_does(name):
     known, _ = judges.pair(robot, contacts, [fb.CoMTask(at.com), moving, *others])
     compiled, reference = judges.pair(robot, contacts, own)
     active = 0
-    for i, state in enumerate(judges.near_and_far(name, 8)):
+    for i, state in enumerate(judges.near_and_far(robot.name, 8)):
         assert judges.difference(compiled, reference, state, 0.1 * i) < judges.agreement(robot)
         assert judges.difference(compiled, known, state, 0.1 * i) < judges.agreement(robot)
         active += len(known(state.q, state.v).active)
     assert active > 8, "nothing was saturated: these states try nothing"
 
 
-def test_user_defined_tasks_on_torques_and_forces():
-    robot = judges.load("go2")
+def test_user_defined_tasks_on_torques_and_forces(go2):
     efforts = [MyEffort("forces"), MyEffort("tau"), fb.ForceTask(), fb.TorqueTask()]
-    tasks = [*fb.standing_tasks(robot.standing()), *efforts]
-    both = judges.pair(robot, judges.stance(robot), tasks)
-    assert judges.largest_difference(both, judges.near_and_far("go2", 6)) < judges.agreement(robot)
+    tasks = [*fb.standing_tasks(go2.standing()), *efforts]
+    both = judges.pair(go2, judges.stance(go2), tasks)
+    assert judges.largest_difference(both, judges.near_and_far("go2", 6)) < judges.agreement(go2)
 
 
 @dataclass
@@ -128,14 +125,13 @@ class Looks:
         return fb.Affine(np.ones((self.rows, eom.nv)), np.zeros(self.rows))
 
 
-@pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "talos", "ur5"], indirect=True)
+def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(robot):
     close, seen = partial(np.allclose, rtol=1e-10, atol=1e-10), []
     contacts, frame = judges.stance(robot), robot.model.frames[robot.model.nframes - 1].name
     tasks = [*fb.standing_tasks(robot.standing()), Looks(seen)]
     controller = fb.WholeBodyController(robot, contacts, tasks, backend="compiled")
-    states = judges.states(name, 5)  # more than a robot's cached memory holds
+    states = judges.states(robot.name, 5)  # more than a robot's cached memory holds
     seen.clear()
     for state in states:
         controller(state.q, state.v)
@@ -160,14 +156,13 @@ def test_a_user_defined_task_sees_equations_of_motion_that_do_not_change_later(n
         seen[0].M = np.eye(robot.nv)
 
 
-def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone():
+def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone(go2):
     """The memory of a state is reused by states of later ticks."""
-    robot = judges.load("go2")
     seen = []
-    tasks = [*fb.standing_tasks(robot.standing()), Looks(seen)]
-    controller = judges.pair(robot, judges.stance(robot), tasks)[0]
+    tasks = [*fb.standing_tasks(go2.standing()), Looks(seen)]
+    controller = judges.pair(go2, judges.stance(go2), tasks)[0]
 
-    def arrays(state: State) -> list[np.ndarray]:
+    def arrays(state: fb.State) -> list[np.ndarray]:
         """Return all arrays that the state of a new tick provides."""
         seen.clear()
         controller(state.q, state.v)
@@ -176,7 +171,7 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone():
         kept = [getattr(at, part) for part in STATE_PARTS]
         return [*asked, at.frame_pose("base").homogeneous, *kept]
 
-    kept = arrays(robot.random_state(1_000))
+    kept = arrays(go2.random_state(1_000))
     before = [array.copy() for array in kept]
     others = [arrays(state) for state in judges.states("go2", 6)]
     assert all(np.array_equal(array, was) for array, was in zip(kept, before, strict=True))
@@ -184,32 +179,30 @@ def test_arrays_that_a_task_keeps_do_not_change_when_their_state_is_gone():
     assert not any(np.array_equal(*pair) for pair in pairs)
 
 
-def test_a_task_may_have_more_rows_in_one_tick_than_in_another():
-    robot = judges.load("go2")
+def test_a_task_may_have_more_rows_in_one_tick_than_in_another(go2):
     task = Looks([], rows=0)
-    both = judges.pair(robot, judges.stance(robot), [*fb.standing_tasks(robot.standing()), task])
+    both = judges.pair(go2, judges.stance(go2), [*fb.standing_tasks(go2.standing()), task])
     for task.rows in (0, 3, 1, 400, 2):
-        state = robot.random_state(task.rows, 0.1)
-        assert judges.difference(*both, state) < judges.agreement(robot)
+        state = go2.random_state(task.rows, 0.1)
+        assert judges.difference(*both, state) < judges.agreement(go2)
 
 
-def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_on():
-    robot = judges.load("go2")
-    task, slider, pull = MyCoM(np.array(robot.standing().com)), {"bound": 40.0}, np.ones(1)
+def test_the_solution_is_that_of_the_tick_when_user_defined_objects_have_moved_on(go2):
+    task, slider, pull = MyCoM(np.array(go2.standing().com)), {"bound": 40.0}, np.ones(1)
 
     class Drive(LinearConstraint):
         """A constraint that returns the array that it works in."""
 
-        def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             return np.eye(18)[6:7], pull
 
     drive = Drive("drive", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
     push = LinearInequality("push", "forces", lambda eom, t: (np.eye(10)[2:3], [slider["bound"]]))
     bounds = {"FL_foot": lambda t: slider["bound"]}
-    contacts = judges.stance(robot).without("FR_foot") + fb.Contacts([drive])
-    tasks, options = [task, *fb.standing_tasks(robot.standing())], {"max_normal_force": bounds}
-    controller, _ = judges.pair(robot, contacts, tasks, inequalities=[push], **options)
-    command = controller(robot.standing().q, np.zeros(18))
+    contacts = judges.stance(go2).without("FR_foot") + fb.Contacts([drive])
+    tasks, options = [task, *fb.standing_tasks(go2.standing())], {"max_normal_force": bounds}
+    controller, _ = judges.pair(go2, contacts, tasks, inequalities=[push], **options)
+    command = controller(go2.standing().q, np.zeros(18))
     assert command.backend == "compiled"
     slider.update(bound=7.0)
     pull[:] = 50.0
@@ -269,19 +262,17 @@ def _fail() -> object:
         (_fail, RuntimeError, ("the sensor is gone",)),
     ],
 )
-def test_a_task_that_goes_wrong_is_reported_on_both_backends(later, kind, named):
-    robot = judges.load("go2")
-    for controller in judges.pair(robot, judges.stance(robot), [_Wrong(later)]):
-        assert controller(robot.standing().q, np.zeros(18)).backend == controller.backend
+def test_a_task_that_goes_wrong_is_reported_on_both_backends(later, kind, named, go2):
+    for controller in judges.pair(go2, judges.stance(go2), [_Wrong(later)]):
+        assert controller(go2.standing().q, np.zeros(18)).backend == controller.backend
         with raises(kind, *named):
-            controller(robot.standing().q, np.zeros(18), 1.0)
+            controller(go2.standing().q, np.zeros(18), 1.0)
 
 
-def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
-    robot = judges.load("go2")
+def test_nothing_is_compiled_when_tasks_contacts_or_rows_change(go2):
     controller = judges.controller_of("go2", backend="compiled")
-    state, at = robot.random_state(1, 0.1), robot.standing()
-    feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot", "RR_foot"])
+    state, at = go2.random_state(1, 0.1), go2.standing()
+    feet = fb.Contacts.points(go2, frames=["FR_foot", "RL_foot", "RR_foot"])
     held = fb.Contacts([LinearConstraint("hold", 2, lambda s, t: (np.eye(18)[6:8], np.zeros(2)))])
     com, hand = MyCoM(at.com), MyHand("FL_foot", at.point("FL_foot"))
     push = LinearInequality("push", "tau", (np.eye(12), np.full(12, 20.0)))
@@ -301,7 +292,7 @@ def test_nothing_is_compiled_when_tasks_contacts_or_rows_change():
 # constraints --------------------------------------------------------------------------------------
 
 
-def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
+def hold(robot: fb.Robot, joints: list[int]) -> fb.Contacts:
     """Return a constraint that gives some joints accelerations as a function of time.
 
     No two of its rows have the same unit.
@@ -312,13 +303,12 @@ def hold(robot: Robot, joints: list[int]) -> fb.Contacts:
     return fb.Contacts([held])
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_user_defined_constraints_are_kept_with_the_same_torques(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "talos"], indirect=True)
+def test_user_defined_constraints_are_kept_with_the_same_torques(robot):
     feet = judges.stance(robot)
     for contacts in (feet + hold(robot, [7, 9]), hold(robot, [8]) + feet, hold(robot, [6, 7, 8])):
         compiled, reference = judges.pair(robot, contacts)
-        for i, state in enumerate(judges.near_and_far(name, 3)):
+        for i, state in enumerate(judges.near_and_far(robot.name, 3)):
             assert judges.difference(compiled, reference, state, 0.2 * i) < judges.agreement(robot)
             with np.errstate(all="ignore"):
                 try:
@@ -330,29 +320,26 @@ def test_user_defined_constraints_are_kept_with_the_same_torques(name):
             assert max(np.max(np.abs(r)) for r in residuals) < 1e-6
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend):
-    robot = judges.load("go2")
+def test_a_user_defined_constraint_is_evaluated_once_in_a_tick(backend, go2):
     asked, rows = [], (np.eye(18)[6:7], np.zeros(1))
     held = LinearConstraint("held", 1, lambda state, t: asked.append(t) or rows)
-    contacts = judges.stance(robot) + fb.Contacts([held])
-    controller = fb.WholeBodyController(robot, contacts, [], backend=backend)
+    contacts = judges.stance(go2) + fb.Contacts([held])
+    controller = fb.WholeBodyController(go2, contacts, [], backend=backend)
     asked.clear()
-    assert controller(robot.standing().q, np.zeros(18), 0.3).backend == backend
+    assert controller(go2.standing().q, np.zeros(18), 0.3).backend == backend
     assert asked == [0.3]
 
 
-def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows():
+def test_a_constraint_may_have_a_jacobian_that_is_not_its_rows(go2):
     """λ acts on two joints, and the rows constrain one of them."""
 
     class Coupled(LinearConstraint):
-        def jacobian(self, state: State, t: float = 0.0) -> np.ndarray:
+        def jacobian(self, state: fb.State, t: float = 0.0) -> np.ndarray:
             return np.eye(18)[6:7] + np.eye(18)[7:8]
 
-    robot = judges.load("go2")
     held = Coupled("held", 1, lambda state, t: (np.eye(18)[6:7], np.zeros(1)))
-    both = judges.pair(robot, judges.stance(robot).without("FL_foot") + fb.Contacts([held]))
-    assert judges.largest_difference(both, judges.near_and_far("go2", 4)) < judges.agreement(robot)
+    both = judges.pair(go2, judges.stance(go2).without("FL_foot") + fb.Contacts([held]))
+    assert judges.largest_difference(both, judges.near_and_far("go2", 4)) < judges.agreement(go2)
 
 
 class Reuses(PointContact):
@@ -363,53 +350,49 @@ class Reuses(PointContact):
 
     rows, right_side = np.zeros((3, 18)), np.zeros(3)
 
-    def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         A, b = super().constraint(state, t)
         self.rows[:], self.right_side[:] = 2.0 * A, 2.0 * b
         return self.rows, self.right_side
 
-    def jacobian(self, state: State, t: float = 0.0) -> np.ndarray:
+    def jacobian(self, state: fb.State, t: float = 0.0) -> np.ndarray:
         self.rows[:] = super().jacobian(state, t)
         return self.rows
 
 
-def test_user_defined_contacts_may_write_into_the_same_arrays_again():
-    robot = judges.load("go2")
-    others = fb.Contacts.points(robot, frames=["RL_foot", "RR_foot"])
+def test_user_defined_contacts_may_write_into_the_same_arrays_again(go2):
+    others = fb.Contacts.points(go2, frames=["RL_foot", "RR_foot"])
     frames = ("FL_foot", "FR_foot")
     own = fb.Contacts([Reuses(frame, radius=0.022) for frame in frames])
     same = fb.Contacts([PointContact(frame, radius=0.022) for frame in frames])
-    A, b = own.constraint(robot.random_state(0))
-    expected, right_side = same.constraint(robot.random_state(0))
+    A, b = own.constraint(go2.random_state(0))
+    expected, right_side = same.constraint(go2.random_state(0))
     assert np.array_equal(A, 2.0 * expected) and np.array_equal(b, 2.0 * right_side)
-    assert np.array_equal(own.jacobian(robot.random_state(0)), same.jacobian(robot.random_state(0)))
-    known, _ = judges.pair(robot, others + same)
-    for controller in judges.pair(robot, others + own):
+    assert np.array_equal(own.jacobian(go2.random_state(0)), same.jacobian(go2.random_state(0)))
+    known, _ = judges.pair(go2, others + same)
+    for controller in judges.pair(go2, others + own):
         for state in judges.near_and_far("go2", 3):
-            assert judges.difference(controller, known, state) < judges.agreement(robot)
+            assert judges.difference(controller, known, state) < judges.agreement(go2)
 
 
-@pytest.mark.parametrize("backend", ["compiled", "reference"])
-def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(backend):
+def test_a_user_defined_contact_whose_shapes_do_not_fit_together_is_refused(backend, go2):
     class Short(PointContact):
-        def constraint(self, state: State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             A, b = super().constraint(state, t)
             return A[:2], b
 
-    robot = judges.load("go2")
     with raises(InputError, "A", "b", "J", "FL_foot", 2, 3, 18):
-        fb.WholeBodyController(robot, fb.Contacts([Short("FL_foot")]), [], backend=backend)
+        fb.WholeBodyController(go2, fb.Contacts([Short("FL_foot")]), [], backend=backend)
 
 
-def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones():
+def test_a_rolling_wheel_and_a_user_defined_contact_carry_forces_in_their_cones(go2):
     class MyPoint(PointContact):
         """A subclass of a built-in contact, which the tick treats as user-defined."""
 
-    robot = judges.load("go2")
-    feet = fb.Contacts.points(robot, frames=["FR_foot", "RL_foot"])
+    feet = fb.Contacts.points(go2, frames=["FR_foot", "RL_foot"])
     own = [RollingWheel("FL_foot", [0.0, 1.0, 0.0], 0.022), MyPoint("RR_foot", radius=0.022)]
-    tasks = list(fb.standing_tasks(robot.standing()))
+    tasks = list(fb.standing_tasks(go2.standing()))
     for contacts in (feet + fb.Contacts(own), fb.Contacts(own[::-1]) + feet):
-        both = judges.pair(robot, contacts, tasks, min_normal_force=3.0)
+        both = judges.pair(go2, contacts, tasks, min_normal_force=3.0)
         gap = judges.largest_difference(both, judges.near_and_far("go2", 5))
-        assert gap < judges.agreement(robot)
+        assert gap < judges.agreement(go2)

@@ -25,7 +25,6 @@ from floatbase.dynamics import (
     rigid_between,
 )
 from floatbase.errors import InputError
-from floatbase.robots import Robot
 
 M_DISC, R_DISC, G = 3.0, 0.25, 9.81
 I_ACROSS, I_AXLE = 0.25 * M_DISC * R_DISC**2, 0.5 * M_DISC * R_DISC**2
@@ -53,21 +52,21 @@ CART = """<robot name="cart">
 <axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="10" velocity="10"/></joint></robot>"""
 
 
-def read(text: str, path: Path, **more: object) -> Robot:
+def read(text: str, path: Path, **more: object) -> fb.Robot:
     """Load a robot from URDF text."""
     path.write_text(text)
     model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
     limits, posture = np.full(model.nv - 6, np.inf), pin.neutral(model)
-    return Robot(path.stem, model, path, (path.parent,), (), limits, posture, **more)
+    return fb.Robot(path.stem, model, path, (path.parent,), (), limits, posture, **more)
 
 
 @pytest.fixture
-def disc(tmp_path: Path) -> Robot:
+def disc(tmp_path: Path) -> fb.Robot:
     return read(DISC, tmp_path / "disc.urdf")
 
 
 @pytest.fixture
-def cart(tmp_path: Path) -> Robot:
+def cart(tmp_path: Path) -> fb.Robot:
     return read(CART, tmp_path / "cart.urdf")
 
 
@@ -148,13 +147,12 @@ def test_a_number_of_rows_may_be_a_float():
 # bolts: Figure 1, left ----------------------------------------------------------------------------
 
 
-def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_base_wrench():
-    robot = judges.load("go2")
+def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_base_wrench(go2):
     rng = np.random.default_rng(0)
-    model = pin.buildModelFromXML(robot.urdf)
-    model.armature = np.array(robot.model.armature)[6:]
+    model = pin.buildModelFromXML(go2.urdf)
+    model.armature = np.array(go2.model.armature)[6:]
     for seed in range(3):
-        state = robot.random_state(seed)
+        state = go2.random_state(seed)
         R = judges.quaternion_rotation(state.q[3:7])
         v = state.v.copy()
         v[:6] = 0.0
@@ -172,7 +170,7 @@ def test_a_bolted_robot_moves_as_the_fixed_base_robot_and_its_bolts_carry_the_ba
         for child in range(1, model.njoints):
             if model.parents[child] == 0:
                 origin += data.liMi[child].act(data.f[child])
-        own = robot.model.inertias[1]
+        own = go2.model.inertias[1]
         f_own = -own.mass * np.array(model.gravity.linear)
         origin += pin.Force(f_own, np.cross(own.lever, f_own))
         # data.f does not include the weight of links that Pinocchio fixes to the world;

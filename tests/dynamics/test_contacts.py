@@ -11,12 +11,11 @@ import floatbase as fb
 from floatbase.dynamics import FlatFootContact, PointContact
 from floatbase.errors import InputError
 from floatbase.robots import Foot
-from floatbase.simulation import Ground
 
 N = 10
 
 
-name = judges.every_floating_robot
+robot = judges.every_floating_robot
 
 
 def tilted(name: str, seed: int) -> fb.Contacts:
@@ -66,35 +65,34 @@ def test_user_defined_contacts_are_selected_by_name():
     assert np.allclose(eom.J, fb.equations_of_motion(state, fb.Contacts(feet)).J, atol=1e-12)
 
 
-def test_contact_points_are_where_the_physics_has_them_for_any_normal(name):
-    robot = judges.load(name)
-    for seed, state in enumerate(judges.states(name, 3)):
+def test_contact_points_are_where_the_physics_has_them_for_any_normal(robot):
+    for seed, state in enumerate(judges.states(robot.name, 3)):
         leaning, level = judges.random_normals(1, seed)[0], np.array([0.0, 0.0, 1.0])
-        normal = leaning if name in judges.BALLS else level
-        sim = fb.Simulation(robot, Ground(normal=normal))
-        if name in judges.FLAT:
+        normal = leaning if robot.name in judges.BALLS else level
+        sim = fb.Simulation(robot, fb.Ground(normal=normal))
+        if robot.name in judges.FLAT:
             # corners are balls' lowest points, so only level soles can be compared
             state = robot.standing()
         sim.reset(state)
-        make = fb.Contacts.flat_feet if name in judges.FLAT else fb.Contacts.points
+        make = fb.Contacts.flat_feet if robot.name in judges.FLAT else fb.Contacts.points
         contacts = make(robot, normals=normal)
         assert contacts.point_names == sim.point_names
         assert np.allclose(contacts.positions(state), sim.contact_positions(), atol=1e-9)
 
 
-def test_the_contact_jacobian_is_mujocos_at_the_contact_point(name):
-    judge = judges.mujoco_of(name)
-    for seed, state in enumerate(judges.states(name, N)):
-        contacts = tilted(name, seed)
+def test_the_contact_jacobian_is_mujocos_at_the_contact_point(robot):
+    judge = judges.mujoco_of(robot.name)
+    for seed, state in enumerate(judges.states(robot.name, N)):
+        contacts = tilted(robot.name, seed)
         judge.move_to(state)
         points = zip(owners(contacts), contacts.positions(state), strict=True)
         expected = np.vstack([judge.jacobian(frame, point)[0] for frame, point in points])
         assert np.allclose(contacts.jacobian(state), expected, atol=1e-9)
 
 
-def test_b_is_minus_the_change_of_a_v_along_v(name):
-    for seed, state in enumerate(judges.states(name, N, spread=0.6)):
-        contacts = tilted(name, seed)
+def test_b_is_minus_the_change_of_a_v_along_v(robot):
+    for seed, state in enumerate(judges.states(robot.name, N, spread=0.6)):
+        contacts = tilted(robot.name, seed)
         expected = -judges.drift_of(lambda s, c=contacts: c.constraint(s)[0], state)
         assert np.max(np.abs(expected)) > 1e-3
         assert np.allclose(contacts.constraint(state)[1], expected, atol=1e-6)
@@ -119,16 +117,15 @@ def test_corner_forces_make_the_wrench_of_their_generators(name):
 # names, choices, order ----------------------------------------------------------------------------
 
 
-def test_all_feet_touch_by_default_in_the_robots_order(name):
-    robot = judges.load(name)
+def test_all_feet_touch_by_default_in_the_robots_order(robot):
     contacts = judges.stance(robot)
     assert contacts.names == tuple(foot.frame for foot in robot.feet)
     assert len(contacts) == len(robot.feet)
     assert contacts.k == 3 * contacts.n_points == len(contacts.jacobian(robot.standing()))
 
 
-def test_each_contact_has_its_own_slice_of_forces_and_rows(name):
-    state = judges.load(name).random_state(0)
+def test_each_contact_has_its_own_slice_of_forces_and_rows(robot):
+    state = robot.random_state(0)
     contacts = judges.stance(state.robot)
     J, stop = contacts.jacobian(state), 0
     for contact in contacts:
@@ -150,20 +147,18 @@ def test_only_and_without_keep_the_order_and_plus_puts_contacts_behind():
     assert "FR_foot" in repr(contacts)
 
 
-def test_normals_can_be_one_for_all_one_for_each_or_by_name():
-    robot = judges.load("go2")
-    names = fb.Contacts.points(robot).names
+def test_normals_can_be_one_for_all_one_for_each_or_by_name(go2):
+    names = fb.Contacts.points(go2).names
     lean = judges.random_normals(4, 0)
-    assert np.allclose(fb.Contacts.points(robot).normals, [[0.0, 0.0, 1.0]] * 4)
-    assert np.allclose(fb.Contacts.points(robot, normals=5.0 * lean[0]).normals, [lean[0]] * 4)
-    assert np.allclose(fb.Contacts.points(robot, normals=lean).normals, lean)
-    assert np.allclose(fb.Contacts.points(robot, frames=names[::-1], normals=lean).normals, lean)
-    by_name = fb.Contacts.points(robot, normals={names[2]: lean[2]})
+    assert np.allclose(fb.Contacts.points(go2).normals, [[0.0, 0.0, 1.0]] * 4)
+    assert np.allclose(fb.Contacts.points(go2, normals=5.0 * lean[0]).normals, [lean[0]] * 4)
+    assert np.allclose(fb.Contacts.points(go2, normals=lean).normals, lean)
+    assert np.allclose(fb.Contacts.points(go2, frames=names[::-1], normals=lean).normals, lean)
+    by_name = fb.Contacts.points(go2, normals={names[2]: lean[2]})
     assert np.allclose(by_name.normals, [[0, 0, 1], [0, 0, 1], lean[2], [0, 0, 1]])
 
 
-def test_friction_is_that_of_each_contact_at_each_of_its_points():
-    talos = judges.load("talos")
+def test_friction_is_that_of_each_contact_at_each_of_its_points(talos):
     left, right = (foot.frame for foot in talos.feet)
     sole = fb.Contacts.flat_feet(talos, mu=0.4, frames=[left])
     mixed = sole + fb.Contacts.points(talos, mu=0.9, frames=[right])
@@ -172,8 +167,7 @@ def test_friction_is_that_of_each_contact_at_each_of_its_points():
     assert mixed.k == 15
 
 
-def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners():
-    talos = judges.load("talos")
+def test_a_flat_foot_taken_as_a_point_touches_in_the_middle_of_its_corners(talos):
     state = talos.random_state(0)
     points = fb.Contacts.points(talos).positions(state)
     corners = fb.Contacts.flat_feet(talos).positions(state).reshape(2, 4, 3)
@@ -197,13 +191,12 @@ def test_no_contacts_give_empty_rows():
     assert none.k == none.n_points == len(none) == len(fb.Contacts.none()) == 0
 
 
-def test_each_foot_may_have_its_own_friction():
+def test_each_foot_may_have_its_own_friction(talos):
     robot, mu = judges.load("go2"), (0.3, 0.4, 0.5, 0.6)
     assert np.array_equal(fb.Contacts.points(robot, mu=mu).mus, [0.3, 0.4, 0.5, 0.6])
     turned = fb.Contacts.points(robot, mu, frames=judges.stance(robot).names[::-1])
     assert turned["RR_foot"].mu == 0.3
     assert np.array_equal(fb.Contacts.points(robot, mu={"RL_foot": 0.2}).mus, [0.7, 0.7, 0.2, 0.7])
-    talos = judges.load("talos")
     assert np.array_equal(fb.Contacts.flat_feet(talos, mu=mu[:2]).mus, [0.3] * 4 + [0.4] * 4)
 
 
@@ -220,7 +213,7 @@ def test_the_force_of_a_contact_is_its_own_part_of_lambda_or_the_resultant_of_it
             assert np.array_equal(each[1], forces[:, 3:6])
 
 
-def test_feet_are_taken_as_they_are_flat_or_round():
+def test_feet_are_taken_as_they_are_flat_or_round(talos):
     for name in judges.ROBOTS:
         robot = judges.load(name)
         contacts = fb.Contacts.feet(robot, mu=0.4)
@@ -231,34 +224,30 @@ def test_feet_are_taken_as_they_are_flat_or_round():
     plate = Foot("base", corners=[[1, 0, 0], [0, 1, 0], [-1, 0, 0]])
     mixed = fb.load("go2", feet=[Foot("FL_foot", 0.02), plate])
     assert [contact.k for contact in fb.Contacts.feet(mixed)] == [3, 9]
-    talos = fb.load("talos")
     mixed = fb.Contacts.feet(talos, mu={"left_sole_link": 0.3})
     assert np.array_equal(mixed.mus, [0.3] * 4 + [0.7] * 4)
 
 
-def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts():
-    robot = judges.load("go2")
-    legs = fb.load_urdf(robot.urdf, feet=[], posture=robot.posture)
+def test_a_floating_robot_without_feet_gets_a_hint_and_a_fixed_one_no_contacts(go2):
+    legs = fb.load_urdf(go2.urdf, feet=[], posture=go2.posture)
     refused(lambda: fb.Contacts.feet(legs), InputError, "Contacts.points", "feet")
     assert len(fb.Simulation(legs).feet) == 0
     assert len(fb.Contacts.feet(judges.load("ur5"))) == 0
 
 
-def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows():
-    robot = judges.load("go2")
-    state = robot.standing()
-    sole = fb.Contacts.points(robot).positions(state)[0]
-    expected = [0.0, 0.0, robot.foot("FL_foot").radius]
-    assert np.allclose(state.point("FL_foot") - sole, expected, atol=1e-12)
-    here = fb.FrameTask("FL_foot", state.point("FL_foot"))
-    eom = fb.equations_of_motion(state, fb.Contacts.none())
+def test_a_ball_foots_contact_is_one_radius_below_the_frame_that_a_task_follows(go2, standing):
+    sole = fb.Contacts.points(go2).positions(standing)[0]
+    expected = [0.0, 0.0, go2.foot("FL_foot").radius]
+    assert np.allclose(standing.point("FL_foot") - sole, expected, atol=1e-12)
+    here = fb.FrameTask("FL_foot", standing.point("FL_foot"))
+    eom = fb.equations_of_motion(standing, fb.Contacts.none())
     # no error to correct
-    assert np.allclose(here.residual(eom).b, state.frame_drift("FL_foot")[:3])
+    assert np.allclose(here.residual(eom).b, standing.frame_drift("FL_foot")[:3])
     # kp times the radius, m/s²
     assert np.linalg.norm(fb.FrameTask("FL_foot", sole).residual(eom).b) > 5.0
 
 
-def test_a_user_defined_constraint_needs_no_friction_and_an_incomplete_one_is_refused():
+def test_a_user_defined_constraint_needs_no_friction_and_an_incomplete_one_is_refused(go2):
     class Rail:
         name, k, row_names = "rail", 1, ("across",)
 
@@ -268,10 +257,9 @@ def test_a_user_defined_constraint_needs_no_friction_and_an_incomplete_one_is_re
         def constraint(self, state: fb.State, t: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
             return np.eye(18)[6:7], np.zeros(1)
 
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot, frames=["FL_foot"]) + fb.Contacts([Rail()])
+    contacts = fb.Contacts.points(go2, frames=["FL_foot"]) + fb.Contacts([Rail()])
     assert contacts.k == 4 and contacts.point_names == ("FL_foot",)
     assert [contact.name for contact in contacts.friction_contacts] == ["FL_foot"]
-    assert fb.equations_of_motion(robot.standing(), contacts).A.shape == (4, 18)
+    assert fb.equations_of_motion(go2.standing(), contacts).A.shape == (4, 18)
     Rail.mu = 0.5
     refused(lambda: fb.Contacts([Rail()]), InputError, "rail", "normal", "point_names")

@@ -18,30 +18,30 @@ from floatbase.dynamics import delassus_matrix
 N = 10
 
 
-name = judges.every_robot
+robot = judges.every_robot
 
 
-def test_inertia_agrees_with_mujoco(name):
-    for state in judges.states(name, N):
-        assert judges.relative(state.M, judges.mujoco_of(name).move_to(state).M) < 1e-9
+def test_inertia_agrees_with_mujoco(robot):
+    for state in judges.states(robot.name, N):
+        assert judges.relative(state.M, judges.mujoco_of(robot.name).move_to(state).M) < 1e-9
 
 
-def test_bias_force_agrees_with_mujoco(name):
-    for state in judges.states(name, N, spread=1.0):
-        assert judges.relative(state.h, judges.mujoco_of(name).move_to(state).h) < 1e-9
+def test_bias_force_agrees_with_mujoco(robot):
+    for state in judges.states(robot.name, N, spread=1.0):
+        assert judges.relative(state.h, judges.mujoco_of(robot.name).move_to(state).h) < 1e-9
 
 
-def test_acceleration_agrees_with_the_articulated_body_algorithm(name):
+def test_acceleration_agrees_with_the_articulated_body_algorithm(robot):
     rng = np.random.default_rng(0)
-    for state in judges.states(name, N):
+    for state in judges.states(robot.name, N):
         eom = fb.equations_of_motion(state, judges.stance(state.robot))
         tau, forces = 20.0 * rng.normal(size=eom.d), 50.0 * rng.normal(size=eom.k)
         assert judges.relative(eom.acceleration(tau, forces), judges.aba(eom, tau, forces)) < 1e-8
 
 
-def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algorithm_gives(name):
+def test_the_residual_of_the_equations_is_zero_at_what_the_articulated_body_algorithm_gives(robot):
     rng = np.random.default_rng(1)
-    state = judges.load(name).random_state(2)
+    state = robot.random_state(2)
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     tau, forces = rng.normal(size=eom.d), rng.normal(size=eom.k)
     qdd = judges.aba(eom, tau, forces)
@@ -79,15 +79,14 @@ def test_a_fixed_base_has_the_equations_of_a_manipulator():
     assert np.allclose(eom.acceleration(tau, []), expected, atol=1e-9)
 
 
-def test_rotor_inertia_counts():
-    robot = judges.load("talos")
-    assert np.any(robot.model.armature > 0)
-    state = robot.standing()
-    bare = robot.model.copy()
+def test_rotor_inertia_counts(talos):
+    assert np.any(talos.model.armature > 0)
+    state = talos.standing()
+    bare = talos.model.copy()
     bare.armature = np.zeros(bare.nv)
     light = pin.crba(bare, bare.createData(), state.q)
     light = np.triu(light) + np.triu(light, 1).T
-    assert np.allclose(state.M - light, np.diag(robot.model.armature), atol=1e-12)
+    assert np.allclose(state.M - light, np.diag(talos.model.armature), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", fb.catalogue())
@@ -105,9 +104,8 @@ def test_contact_accelerations_answer_to_contact_forces_by_j_minv_jt(name):
     assert judges.relative(delassus_matrix(eom), np.column_stack(columns)) < 1e-9
 
 
-def test_matrices_are_computed_on_first_use_and_can_be_replaced():
-    state = judges.load("go2").standing()
-    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+def test_matrices_are_computed_on_first_use_and_can_be_replaced(standing):
+    eom = fb.equations_of_motion(standing, fb.Contacts.points(standing.robot))
     assert "M" not in vars(eom) and "h" not in vars(eom)
     heavy = replace(replace(eom, M=2.0 * eom.M), h=2.0 * eom.h)
     assert np.array_equal(heavy.M, 2.0 * eom.M) and np.array_equal(heavy.h, 2.0 * eom.h)
@@ -116,9 +114,8 @@ def test_matrices_are_computed_on_first_use_and_can_be_replaced():
         replace(eom, mass=2.0)
 
 
-def test_tau_and_forces_have_the_size_of_the_matrices_that_were_given():
-    state = judges.load("go2").standing()
-    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+def test_tau_and_forces_have_the_size_of_the_matrices_that_were_given(standing):
+    eom = fb.equations_of_motion(standing, fb.Contacts.points(standing.robot))
     other = replace(eom, S=np.eye(eom.nv), J=eom.J[:3])
     assert (other.d, other.k) == (eom.nv, 3)
     assert other.acceleration(np.ones(eom.nv), np.zeros(3)).shape == (eom.nv,)

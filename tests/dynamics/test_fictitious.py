@@ -14,30 +14,30 @@ from floatbase.dynamics import bias_forces, coriolis_matrix, view_from_rotating_
 N = 5
 
 
-name = judges.every_robot
+robot = judges.every_robot
 
 
-def test_the_parts_sum_to_h(name):
-    for state in judges.states(name, N, spread=1.0):
+def test_the_parts_sum_to_h(robot):
+    for state in judges.states(robot.name, N, spread=1.0):
         parts = bias_forces(state)
         assert judges.relative(parts.total, state.h) < 1e-12
         assert np.array_equal(parts.fictitious, parts.centrifugal + parts.coriolis)
 
 
-def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(name):
-    judge = judges.Mujoco(judges.load(name))
+def test_velocity_forces_are_those_of_mujoco_with_gravity_switched_off(robot):
+    judge = judges.Mujoco(robot)
     judge.model.opt.gravity[:] = 0.0
-    for state in judges.states(name, N, spread=1.0):
+    for state in judges.states(robot.name, N, spread=1.0):
         assert judges.relative(bias_forces(state).fictitious, judge.move_to(state).h) < 1e-8
 
 
-def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(name):
+def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_in_the_world(robot):
     """In MuJoCo, the linear velocity of a free joint is in world axes, and the angular velocity in
     the axes of the base.
     """
-    judge = judges.Mujoco(judges.load(name))
+    judge = judges.Mujoco(robot)
     judge.model.opt.gravity[:] = 0.0
-    for state in judges.states(name, N, spread=1.0):
+    for state in judges.states(robot.name, N, spread=1.0):
         raw = judge.move_to(state).data.qfrc_bias
         to_raw = judge.T.copy()  # maps velocities from our order to MuJoCo's
         if state.robot.is_floating:
@@ -46,11 +46,11 @@ def test_in_the_worlds_axes_they_are_those_of_mujoco_too_whose_base_velocity_is_
         assert judges.relative(bias_forces(state, axes="world").fictitious, to_raw.T @ raw) < 1e-8
 
 
-def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(name):
+def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bolted_down(robot):
     """World acceleration of the base if h alone acts: M q̈ = -h in base axes, Tᵀ M T u̇ = -h in
     world axes.
     """
-    for state in judges.states(name, N, spread=1.0):
+    for state in judges.states(robot.name, N, spread=1.0):
         own, world = bias_forces(state), bias_forces(state, axes="world")
         if not state.robot.is_floating:
             assert np.array_equal(own.total, world.total)
@@ -67,23 +67,23 @@ def test_axes_do_not_change_the_acceleration_nor_the_parts_of_a_robot_that_is_bo
         assert np.allclose(world.gravity, T.T @ own.gravity)
 
 
-def test_gravity_is_the_slope_of_the_weights_potential_energy(name):
+def test_gravity_is_the_slope_of_the_weights_potential_energy(robot):
     """MuJoCo computes the potential energy."""
-    judge = judges.Mujoco(judges.load(name))
+    judge = judges.Mujoco(robot)
     judge.model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
 
     def potential(state: fb.State) -> np.ndarray:
         mujoco.mj_energyPos(judge.model, judge.move_to(state).data)
         return np.array([judge.data.energy[0]])
 
-    for state in judges.states(name, 2):
+    for state in judges.states(robot.name, 2):
         slope = judges.jacobian_of(potential, state)[0]
         assert judges.relative(bias_forces(state).gravity, slope) < 1e-5
 
 
-def test_coriolis_forces_are_the_products_of_two_different_velocities(name):
+def test_coriolis_forces_are_the_products_of_two_different_velocities(robot):
     """Sum over i < j of the forces that need both velocities, by MuJoCo without gravity."""
-    state = judges.load(name).random_state(4, spread=1.0)
+    state = robot.random_state(4, spread=1.0)
     judge = judges.Mujoco(state.robot)
     judge.model.opt.gravity[:] = 0.0
 
@@ -98,14 +98,14 @@ def test_coriolis_forces_are_the_products_of_two_different_velocities(name):
     assert judges.relative(bias_forces(state).centrifugal, sum(alone)) < 1e-8
 
 
-def test_the_coriolis_matrix_gives_the_velocity_forces(name):
-    for state in judges.states(name, N, spread=1.0):
+def test_the_coriolis_matrix_gives_the_velocity_forces(robot):
+    for state in judges.states(robot.name, N, spread=1.0):
         found = coriolis_matrix(state) @ state.v
         assert judges.relative(found, bias_forces(state).fictitious) < 1e-9
 
 
-def test_inertia_changes_as_finite_differences_along_v_say(name):
-    for state in judges.states(name, N, spread=1.0):
+def test_inertia_changes_as_finite_differences_along_v_say(robot):
+    for state in judges.states(robot.name, N, spread=1.0):
         differences = judges.derivative(lambda s: s.M, state, state.v, 1e-5)
         C = coriolis_matrix(state)
         assert judges.relative(C + C.T, differences) < 1e-6

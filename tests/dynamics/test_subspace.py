@@ -220,10 +220,9 @@ def test_solo8_on_four_feet_has_rank_10_if_symmetric_9_with_straight_legs_11_els
         assert found.rank_V_qdd == 8 - rank + found.rank_J_base
 
 
-def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_there_too():
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
-    for state, lost in ((robot.standing(), 0), (robot.neutral(), 4)):
+def test_straight_knees_cost_rank_once_the_base_is_bolted_and_the_formula_holds_there_too(go2):
+    contacts = fb.Contacts.points(go2) + fb.Contacts([fixed_frame("base")])
+    for state, lost in ((go2.standing(), 0), (go2.neutral(), 4)):
         found = dynamics.dimensions(fb.equations_of_motion(state, contacts))
         assert found.rank_J == 18 - lost
         assert found.null_B == found.null_C == 12 + 18 - found.rank_J
@@ -354,12 +353,11 @@ def test_zeta_gives_the_smallest_forces_and_eta_the_only_accelerations(name):
         assert np.max(np.abs(N.T @ found), initial=0.0) < 1e-6 * scale, case
 
 
-@pytest.mark.parametrize("name", judges.BALLS)
-def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_1e_4_of_the_weight(name):
+@pytest.mark.parametrize("robot", judges.BALLS, indirect=True)
+def test_mujocos_forces_in_motion_differ_from_zeta_by_less_than_1e_4_of_the_weight(robot):
     """The difference is 2e-5 of the weight while swaying at 1 rad/s and 2 cm, so a rigid contact is
     a good model of MuJoCo's stiffest contact.
     """
-    robot = judges.load(name)
     standing, contacts = robot.standing(), judges.stance(robot)
 
     def sway(t: float) -> Array:

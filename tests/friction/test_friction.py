@@ -214,11 +214,8 @@ def test_a_projection_is_the_nearest_point_of_the_cone(seed, n, mu, inside):
     [
         (lambda: FrictionCone(UP, 0.0), "mu", 0),
         (lambda: FrictionCone(np.zeros(3), 0.7), "normal"),
-        (lambda: FrictionCone(UP, 0.7).margin([0.0, 1.0]), "force", 2, 3),
-        (lambda: FrictionCone(UP, 0.7).contains(UP, tolerance=-1.0), "tolerance", -1),
         (lambda: FrictionPolyhedron(UP, 0.0), "mu", 0),
         (lambda: FrictionPolyhedron(np.zeros(3), 0.7), "normal"),
-        (lambda: FrictionPolyhedron(UP, 0.7).margin([1.0]), "force", 1, 3),
         (lambda: FrictionPolyhedron(UP, 0.7, 2), "facets", 2, 3),
         (lambda: FrictionPolyhedron(UP, 0.7, 4.5), "facets", 4.5),
     ],

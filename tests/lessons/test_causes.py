@@ -110,10 +110,9 @@ def test_a_ramp_makes_the_torques_of_a_crawl_jump_less_but_not_those_of_a_trot()
     assert jump(trot, 0.1) > 0.9 * jump(trot, 0.0)
 
 
-def test_a_foot_can_be_lifted_beside_the_triangle_if_the_ground_can_pull():
-    state = GO2.standing()
-    up = fb.FrameTask("FL_foot", state.point("FL_foot") + [0, 0, 0.05], kp=100)
-    tasks, outcomes = [*fb.standing_tasks(state), up], []
+def test_a_foot_can_be_lifted_beside_the_triangle_if_the_ground_can_pull(standing):
+    up = fb.FrameTask("FL_foot", standing.point("FL_foot") + [0, 0, 0.05], kp=100)
+    tasks, outcomes = [*fb.standing_tasks(standing), up], []
     for mismatch, adhesion in ((None, 0.0), (ModelMismatch(cones=False), 30.0)):
         ground = Perturbation(adhesion_force=adhesion, disabled_contacts=["FL_foot"])
         sim = PerturbedSimulation(GO2, 0.7, perturbation=ground)
@@ -124,10 +123,9 @@ def test_a_foot_can_be_lifted_beside_the_triangle_if_the_ground_can_pull():
     assert outcomes == ["fell", "completed"]
 
 
-def test_a_short_push_leaves_the_ground_no_time_and_strong_legs_do_not_help():
-    state = GO2.standing()
-    aside = CONTACTS.positions(state)[0, 1] - state.com[1]
-    impulse = GO2.mass * np.sqrt(GO2.gravity * state.com[2]) / state.com[2] * aside  # m ω s
+def test_a_short_push_leaves_the_ground_no_time_and_strong_legs_do_not_help(standing):
+    aside = CONTACTS.positions(standing)[0, 1] - standing.com[1]
+    impulse = GO2.mass * np.sqrt(GO2.gravity * standing.com[2]) / standing.com[2] * aside  # m ω s
 
     def stands(factor, duration, strength=1.0):
         robot = fb.load("go2", torque_limits=strength * np.array(GO2.torque_limits))

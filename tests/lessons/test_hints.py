@@ -69,8 +69,7 @@ def test_every_hint_of_a_lesson_has_an_example(lesson):
 
 @pytest.mark.parametrize("name", EXERCISES)
 def test_nothing_that_a_learner_may_give_makes_a_check_fail(name):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         told = {kind: EXERCISES[name].judge(odd) for kind, odd in ODD.items()}
     for kind, verdict in told.items():
         assert not verdict.right and verdict.text and verdict.hint, kind

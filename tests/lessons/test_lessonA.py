@@ -23,9 +23,8 @@ def test_a_tumble_has_the_same_acceleration_in_both_frames():
     assert abs(less - force - mass * 2.0 * 2.0) < 1  # N: the text has two digits
 
 
-def sideways(name, size=1.0, phase=90):
+def sideways(robot, size=1.0, phase=90):
     """How far the feet of a robot travel to the left [mm] while its base goes round an ellipse."""
-    robot = judges.load(name)
     state, contacts = robot.standing(), fb.Contacts.points(robot)
     com, upright, _ = fb.standing_tasks(state)
     loops = elliptic_rotation(pitch=0.3 * size, yaw=0.35 * size, rate=0.6, loops=6, phase=phase)
@@ -38,16 +37,16 @@ def sideways(name, size=1.0, phase=90):
 
 
 @pytest.mark.front_end
-def test_feet_travel_because_the_base_goes_round_an_area():
+def test_feet_travel_because_the_base_goes_round_an_area(go2):
     """Without an area, five millimetres remain; of 17 to 22."""
-    assert abs(sideways("go2", phase=0)).max() < 5.5 < 15 < abs(sideways("go2")).min()
+    assert abs(sideways(go2, phase=0)).max() < 5.5 < 15 < abs(sideways(go2)).min()
 
 
 @pytest.mark.front_end
-def test_front_and_rear_feet_travel_apart_only_if_all_knees_bend_the_same_way():
-    front_left, front_right, rear_left, rear_right = sideways("go2", 0.5)
+def test_front_and_rear_feet_travel_apart_only_if_all_knees_bend_the_same_way(go2):
+    front_left, front_right, rear_left, rear_right = sideways(go2, 0.5)
     assert max(front_left, front_right) < -3 and min(rear_left, rear_right) > 3
-    assert sideways("solo12", 0.5).max() < -3  # its front and hind knees bend apart
+    assert sideways(judges.load("solo12"), 0.5).max() < -3  # its front and hind knees bend apart
 
 
 @pytest.mark.front_end

@@ -35,11 +35,6 @@ def for_a_site(monkeypatch):
     monkeypatch.setenv("FLOATBASE_VIEWER", "site")
 
 
-@pytest.fixture(scope="module")
-def go2():
-    return fb.load("go2")
-
-
 @pytest.fixture
 def view(go2):
     made = fb.Viewer(go2, height=200)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from disk import full_disk
 from hints import LIFTED, ODD
 
 import floatbase as fb
@@ -300,15 +299,6 @@ def test_a_table_replaces_only_an_earlier_table(learner):
     for _ in range(2):
         grades.write_table(submissions, table)
     assert len(table.read_text().splitlines()) > len(all_exercises())
-
-
-def test_a_full_disk_keeps_the_file_that_was_handed_in_before(learner):
-    check("00.1", 3.0)
-    path = hand_in("Ada")
-    kept = path.read_bytes()
-    with full_disk(10), pytest.raises(InputError):
-        hand_in("Ada")
-    assert path.read_bytes() == kept and list(Path().glob("*answers*")) == [path]
 
 
 @pytest.mark.parametrize(

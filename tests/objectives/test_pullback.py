@@ -8,7 +8,6 @@ from messages import raises
 
 import floatbase as fb
 from floatbase import dynamics, objectives
-from floatbase.affine import Quadratic
 from floatbase.dynamics import EquationsOfMotion, fixed_frame
 from floatbase.errors import InputError
 
@@ -31,8 +30,8 @@ def costs(eom: EquationsOfMotion, seed: int = 0) -> dict[str, tuple[Array, Array
     return found
 
 
-def as_quadratics(residuals: dict[str, tuple[Array, Array]]) -> dict[str, Quadratic]:
-    return {block: Quadratic.from_residual(A, r) for block, (A, r) in residuals.items()}
+def as_quadratics(residuals: dict[str, tuple[Array, Array]]) -> dict[str, fb.Quadratic]:
+    return {block: fb.Quadratic.from_residual(A, r) for block, (A, r) in residuals.items()}
 
 
 def least(eom, residuals, fixed=None):
@@ -70,7 +69,7 @@ def test_a_cost_on_accelerations_seen_from_torques_is_the_cost_of_what_the_torqu
     rng = np.random.default_rng(0)
     for seed in (None, 0):
         eom = judges.at_rest(name, seed)
-        cost = Quadratic.from_residual(*costs(eom)["qdd"])
+        cost = fb.Quadratic.from_residual(*costs(eom)["qdd"])
         seen = cost.pullback(fb.accelerations_from_torques(eom))
         for _ in range(5):
             tau = rng.normal(size=eom.d)
@@ -156,17 +155,16 @@ def test_the_two_readings_agree_where_the_block_determines_beta_and_differ_where
             assert (smallest(x) == pytest.approx(best(x), rel=1e-7)) == agree
 
 
-def test_accelerations_that_cannot_change_do_not_determine_beta():
+def test_accelerations_that_cannot_change_do_not_determine_beta(go2):
     """go2 with a fixed base and feet on the ground: V_q̈ = 0 up to rounding, so the map from q̈ to
     β must not contain 1 / rounding.
     """
-    robot = judges.load("go2")
-    contacts = fb.Contacts.points(robot) + fb.Contacts([fixed_frame("base")])
-    eom = fb.equations_of_motion(robot.standing(), contacts)
+    contacts = fb.Contacts.points(go2) + fb.Contacts([fixed_frame("base")])
+    eom = fb.equations_of_motion(go2.standing(), contacts)
     space = dynamics.feasible_space(eom)
     assert np.max(np.abs(space.qdd.A)) < 1e-10
     assert np.max(np.abs(objectives.minimum_norm_coordinates(space, "qdd").A)) < 1e6
-    cost = objectives.cost_on_space(space, tau=Quadratic.from_residual(np.eye(12), np.zeros(12)))
+    cost = objectives.cost_on_space(space, tau=fb.Quadratic.from_residual(np.eye(12), np.zeros(12)))
     found = objectives.partial_minimum(cost, space, "qdd")(np.zeros(18))
     assert found == pytest.approx(cost(cost.minimiser()), abs=1e-6)  # q̈ leaves everything free
 
@@ -176,7 +174,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
     squeeze = dynamics.internal_forces(eom)[:, 0]
-    reward = objectives.cost_on_space(space, forces=Quadratic(np.zeros((12, 12)), -squeeze))
+    reward = objectives.cost_on_space(space, forces=fb.Quadratic(np.zeros((12, 12)), -squeeze))
     for call in (objectives.partial_minimum, objectives.argmin_coordinates):
         with raises(InputError):
             call(reward, space, "qdd")
@@ -186,7 +184,7 @@ def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused()
 def test_directions_that_cost_nothing_are_left_alone():
     eom = judges.at_rest("go2")
     space = dynamics.feasible_space(eom)
-    free = Quadratic.zero(space.dimension)
+    free = fb.Quadratic.zero(space.dimension)
     x = space.qdd(np.ones(space.dimension))
     smallest = objectives.minimum_norm_coordinates(space, "qdd")(x)
     assert np.allclose(objectives.argmin_coordinates(free, space, "qdd")(x), smallest)
@@ -202,8 +200,8 @@ def test_weights_ten_orders_apart_do_not_blind_the_best_reading():
     space = dynamics.feasible_space(eom)
     desired = np.arange(12.0)
     for weight in (1e-2, 1e-6, 1e-10):
-        tau = Quadratic.from_residual(np.eye(8), np.zeros(8))
-        forces = Quadratic.from_residual(np.eye(12), desired, weight)
+        tau = fb.Quadratic.from_residual(np.eye(8), np.zeros(8))
+        forces = fb.Quadratic.from_residual(np.eye(12), desired, weight)
         cost = objectives.cost_on_space(space, tau=tau, forces=forces)
         beta = objectives.argmin_coordinates(cost, space, "qdd")(np.zeros(14))
         N = dynamics.undetermined_forces(eom)

@@ -19,7 +19,7 @@ N = 5
 DRIFT = 0.01
 
 
-name = judges.every_robot
+robot = judges.every_robot
 
 
 def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Generator]]:
@@ -32,8 +32,8 @@ def cases(name: str) -> list[tuple[EquationsOfMotion, np.ndarray, np.random.Gene
     return found
 
 
-def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(name):
-    for eom, qdd, rng in cases(name):
+def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(robot):
+    for eom, qdd, rng in cases(robot.name):
         target, velocity, feed = rng.normal(size=(3, 3))
         task = fb.CoMTask(target, velocity, feed, kp=7.0, kd=3.0)
         actual = judges.acceleration_of(lambda s: s.com, eom.state, qdd)
@@ -42,8 +42,8 @@ def test_the_centre_of_mass_residual_is_its_acceleration_less_the_desired_one(na
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name):
-    for eom, qdd, rng in cases(name):
+def test_the_frame_residual_is_its_acceleration_less_the_desired_one(robot):
+    for eom, qdd, rng in cases(robot.name):
         frame = eom.robot.frames[-1]
         target, velocity, feed = rng.normal(size=(3, 3))
         task = fb.FrameTask(frame, target, velocity, feed, kp=7.0, kd=3.0)
@@ -53,8 +53,8 @@ def test_the_frame_residual_is_its_acceleration_less_the_desired_one(name):
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=2e-5)
 
 
-def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(name):
-    for eom, qdd, rng in cases(name):
+def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_one(robot):
+    for eom, qdd, rng in cases(robot.name):
         frame = eom.robot.frames[-1]
         R = eom.state.frame_pose(frame).rotation
         error, velocity, feed = 0.5 * rng.normal(size=(3, 3))
@@ -72,8 +72,8 @@ def test_the_orientation_residual_is_the_angular_acceleration_less_the_desired_o
         assert np.allclose(task.residual(eom)(qdd), actual - desired, atol=5e-5)
 
 
-def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(name):
-    for eom, qdd, rng in cases(name):
+def test_the_posture_residual_is_each_joints_acceleration_less_a_spring_to_its_angle(robot):
+    for eom, qdd, rng in cases(robot.name):
         robot, state = eom.robot, eom.state
         target = robot.random_state(int(rng.integers(1000)), 0.2)
         task = fb.PostureTask(target.q, kp=7.0, kd=3.0)
@@ -92,8 +92,8 @@ def test_the_posture_of_the_base_does_not_count():
     assert not np.any(residuals[0].A[:, :6])
 
 
-def test_force_and_torque_residuals_are_actual_minus_target(name):
-    for eom, _, rng in cases(name):
+def test_force_and_torque_residuals_are_actual_minus_target(robot):
+    for eom, _, rng in cases(robot.name):
         forces, tau = rng.normal(size=eom.k), rng.normal(size=eom.d)
         assert np.array_equal(fb.ForceTask().residual(eom)(forces), forces)
         assert np.array_equal(fb.TorqueTask().residual(eom)(tau), tau)
@@ -101,8 +101,8 @@ def test_force_and_torque_residuals_are_actual_minus_target(name):
         assert np.allclose(fb.TorqueTask(np.ones(eom.d)).residual(eom)(tau), tau - 1.0)
 
 
-def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(name):
-    state = judges.load(name).standing()
+def test_a_resting_robot_that_stands_where_it_should_is_given_no_acceleration(robot):
+    state = robot.standing()
     eom = fb.equations_of_motion(state, judges.stance(state.robot))
     for task in fb.standing_tasks(state):
         assert np.allclose(task.residual(eom)(np.zeros(eom.nv)), 0.0, atol=1e-9), task.name
@@ -244,16 +244,15 @@ def test_damping_is_critical_unless_it_is_given():
         assert not np.allclose(make(kp=25.0).residual(eom).b, make(kp=25.0, kd=0.0).residual(eom).b)
 
 
-def test_a_target_is_copied_when_a_task_is_made():
-    state = judges.load("go2").standing()
-    eom = fb.equations_of_motion(state, fb.Contacts.none())
-    target = state.com.copy()
+def test_a_target_is_copied_when_a_task_is_made(standing):
+    eom = fb.equations_of_motion(standing, fb.Contacts.none())
+    target = standing.com.copy()
     task = fb.CoMTask(target)
     target += 1.0
     assert np.allclose(task.residual(eom).b, 0.0, atol=1e-9)
     forces = np.zeros(12)
     hold = fb.ForceTask(forces)
-    eom = fb.equations_of_motion(state, fb.Contacts.points(state.robot))
+    eom = fb.equations_of_motion(standing, fb.Contacts.points(standing.robot))
     forces += 1.0
     assert np.array_equal(hold.residual(eom)(np.zeros(12)), np.zeros(12))
 

@@ -104,7 +104,7 @@ def test_a_row_that_would_have_to_pull_is_dropped():
     assert np.allclose(second.x_next, [0.5, 1.0])
 
 
-def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimised():
+def test_a_start_below_the_table_is_lifted_onto_it_before_anything_is_minimized():
     run = active_set(table_top((0.5, -1.0)), start=(0.0, -3.0))
     assert run.phase_one[0].objective == pytest.approx(3.0)  # the largest violation, m
     assert np.allclose(run.iterations[0].x, [0.0, 0.0])

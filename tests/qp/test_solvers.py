@@ -241,16 +241,15 @@ def exact_sum(A, x, b):
 
 
 @pytest.mark.front_end
-def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method():
+def test_weights_too_far_apart_for_daqp_are_answered_by_the_active_set_method(talos):
     """DAQP does not converge here, or ends 0.03 N·m off without a word; curvatures of the reduced H
     run from 1e-11 to 20.
     """
-    robot = judges.load("talos")
-    at = robot.standing()
+    at = talos.standing()
     tasks = [fb.CoMTask(at.com, weight=100.0), fb.OrientationTask("base", weight=100.0)]
-    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), tasks, backend="reference")
+    controller = fb.WholeBodyController(talos, fb.Contacts.feet(talos), tasks, backend="reference")
     answered = set()
-    for state in (at, robot.random_state(1, 0.1), robot.random_state(2, 0.1)):
+    for state in (at, talos.random_state(1, 0.1), talos.random_state(2, 0.1)):
         found = controller(state.q, state.v).solution
         answered.add(found.solver)
         assert found.residuals.inequality < FEASIBILITY_TOLERANCE
@@ -290,10 +289,9 @@ def test_small_force_weights_do_not_make_a_problem_infeasible():
     assert "active_set" in answered, "DAQP managed: these states no longer try what this tests"
 
 
-def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(monkeypatch):
+def test_a_solver_that_is_not_installed_is_not_listed_and_its_extra_is_named(monkeypatch, go2):
     monkeypatch.setitem(sys.modules, "cvxpy", None)  # as if it were not installed
     assert "cvxpy" not in solvers()
     refused(lambda: solve(corner(), "cvxpy"), MissingDependencyError, "cvxpy", "floatbase[cvxpy]")
-    robot = judges.load("go2")
     with raises(MissingDependencyError, "floatbase[cvxpy]"):
-        fb.WholeBodyController(robot, judges.stance(robot), [], solver="cvxpy")
+        fb.WholeBodyController(go2, judges.stance(go2), [], solver="cvxpy")

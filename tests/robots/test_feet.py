@@ -74,8 +74,7 @@ def package(folder, name="sole.obj", unit=1.0):
 def test_soles_are_found_in_the_collision_shapes(foot, feet, tmp_path):
     file = package(tmp_path) / "biped.urdf"
     file.write_text(biped(foot), encoding="utf-8")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         robot = fb.load_urdf(file, feet=feet)
     assert [foot.frame for foot in robot.feet] == ["L_foot", "R_foot"]
     for sole in robot.feet:
@@ -106,9 +105,8 @@ def test_a_quadruped_bends_its_legs_far_enough_to_walk(kind):
     assert walk.speed_fraction == 1.0
 
 
-@pytest.mark.parametrize("name", ["hyq", "anymal_kinova", "g1"])
-def test_feet_of_the_catalogue_are_found_in_their_urdfs(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["hyq", "anymal_kinova", "g1"], indirect=True)
+def test_feet_of_the_catalogue_are_found_in_their_urdfs(robot):
     found = fb.load_urdf(robot.urdf, package_dirs=robot.package_dirs)
     known = {foot.frame: foot for foot in robot.feet}
     assert {foot.frame for foot in found.feet} == set(known)
@@ -138,8 +136,7 @@ def test_a_humanoid_stands_three_lines_after_its_file():
     ],
 )
 def test_straight_legs_are_bent_as_far_as_their_limits_allow(knee, kind, sign):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         robot = fb.load_urdf(biped(BALLS, knee, kind))
     start = fb.State(robot, robot.posture)
     thigh, shank, sole = (start.frame_pose(f"L_{link}") for link in ("pitch", "knee", "foot"))
@@ -215,12 +212,6 @@ def test_a_posture_may_be_given_by_joint_names():
         fb.load("go2", posture={"FL_calf_joint": "straight"})
     with raises(InputError, "FL_calf_joint", 9, -0.83776):
         fb.load("go2", posture={"FL_calf_joint": 9.0})
-
-
-def test_a_foot_answers_with_its_points():
-    ball, sole = Foot("toe", 0.02, [0.0, 0.0, 0.1]), Foot("sole", corners=np.eye(3))
-    assert ball.points.tolist() == [[0.0, 0.0, 0.1]] and not ball.is_flat
-    assert sole.points.tolist() == np.eye(3).tolist() and sole.is_flat
 
 
 def test_a_ball_far_from_the_origin_of_its_link_has_a_frame_of_its_own_which_swings_move():

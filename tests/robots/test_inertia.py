@@ -6,6 +6,7 @@ import judges
 import numpy as np
 import pinocchio as pin
 import pytest
+from messages import refused
 
 import floatbase as fb
 from floatbase.errors import InputError, UnknownNameError
@@ -40,11 +41,10 @@ def test_a_payload_is_a_point_mass_for_pinocchio_and_mujoco(name, frame):
         assert np.allclose(judge.h, with_it.h, atol=1e-9 * robot.weight)
 
 
-@pytest.mark.parametrize("name", ["go2", "talos", "ur5"])
-def test_scaled_masses_scale_inertia_and_forces(name):
-    robot = judges.load(name)
+@pytest.mark.parametrize("robot", ["go2", "talos", "ur5"], indirect=True)
+def test_scaled_masses_scale_inertia_and_forces(robot):
     heavy = robot.with_scaled_mass(1.3)
-    for state in judges.states(name, 2):
+    for state in judges.states(robot.name, 2):
         scaled = fb.State(heavy, state.q, state.v)
         assert np.allclose(scaled.M, 1.3 * state.M, atol=ROUNDING * np.abs(state.M).max())
         assert np.allclose(scaled.h, 1.3 * state.h, atol=1e-10 * robot.weight)
@@ -52,31 +52,28 @@ def test_scaled_masses_scale_inertia_and_forces(name):
         assert np.allclose(judge.M, scaled.M, atol=ROUNDING * np.abs(scaled.M).max())
 
 
-def test_a_controller_of_a_heavier_robot_is_compiled_and_has_the_torques_of_the_mismatch():
-    robot = judges.load("go2")
-    tasks, contacts = fb.standing_tasks(robot.standing()), judges.stance(robot)
+def test_a_controller_of_a_heavier_robot_is_compiled_and_has_the_torques_of_the_mismatch(go2):
+    tasks, contacts = fb.standing_tasks(go2.standing()), judges.stance(go2)
     compiled = fb.WholeBodyController(
-        robot.with_scaled_mass(1.2), contacts, tasks, backend="compiled"
+        go2.with_scaled_mass(1.2), contacts, tasks, backend="compiled"
     )
     reference = fb.WholeBodyController(
-        robot, contacts, tasks, modify_qp=ModelMismatch(mass=1.2), backend="reference"
+        go2, contacts, tasks, modify_qp=ModelMismatch(mass=1.2), backend="reference"
     )
     for state in judges.states("go2", 5, 0.05):
         one, other = compiled(state.q, state.v), reference(state.q, state.v)
-        assert np.allclose(one.tau, other.tau, atol=1e-6 * robot.torque_limits)
+        assert np.allclose(one.tau, other.tau, atol=1e-6 * go2.torque_limits)
 
 
 @pytest.mark.parametrize("is_assumed", [True, False])
-def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed):
-    robot = judges.load("go2")
-    loaded = robot.with_payload("base", 0.2 * robot.mass, [0.1, 0.0, 0.1])
+def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed, go2, standing):
+    loaded = go2.with_payload("base", 0.2 * go2.mass, [0.1, 0.0, 0.1])
     sim = fb.Simulation(loaded)
-    sim.reset(robot.standing())
-    start = robot.standing()
+    sim.reset(go2.standing())
     controller = fb.WholeBodyController(
-        loaded if is_assumed else robot,
-        judges.stance(robot),
-        fb.standing_tasks(fb.State(loaded, start.q) if is_assumed else start),
+        loaded if is_assumed else go2,
+        judges.stance(go2),
+        fb.standing_tasks(fb.State(loaded, standing.q) if is_assumed else standing),
     )
     run = fb.rollout(sim, controller, 1.0)
     assert run.outcome == "completed"
@@ -85,12 +82,11 @@ def test_a_payload_in_the_simulation_may_be_unknown_to_the_controller(is_assumed
     assert abs(sinks) < 1e-3 if is_assumed else sinks > 5e-3
 
 
-def test_a_robot_with_a_payload_is_another_robot_with_the_same_joints():
-    robot = judges.load("go2")
-    loaded = robot.with_payload("base", 1.0)
+def test_a_robot_with_a_payload_is_another_robot_with_the_same_joints(go2):
+    loaded = go2.with_payload("base", 1.0)
     twice = loaded.with_payload("base", 1.0).with_scaled_mass(2.0)
-    assert loaded != robot and twice.nominal is robot
-    assert twice.has_joints_of(robot) and loaded.has_joints_of(twice)
+    assert loaded != go2 and twice.nominal is go2
+    assert twice.has_joints_of(go2) and loaded.has_joints_of(twice)
     assert pickle.loads(pickle.dumps(twice)) == twice
     assert not loaded.has_joints_of(judges.load("solo12"))
     with pytest.raises(InputError):
@@ -102,11 +98,7 @@ def test_payloads_that_cannot_be_are_refused():
     with pytest.raises(UnknownNameError):
         robot.with_payload("back", 1.0)
     for make, number in (
-        (lambda: robot.with_payload("base", -1.0), "-1"),
-        (lambda: robot.with_payload("base", 1.0, [0.0, 0.0]), "(2,)"),
         (lambda: arm.with_payload(arm.base, 1.0), arm.base),
         (lambda: robot.with_scaled_mass(0.0), "0"),
     ):
-        with pytest.raises(InputError) as raised:
-            make()
-        assert number in str(raised.value)
+        refused(make, InputError, number)

@@ -142,8 +142,7 @@ def test_keyframes_are_postures(quadruped):
 def test_a_keyframe_upside_down_or_with_straight_legs_is_reported(load, knee, quaternion, named):
     home = HOME.replace("-1.5", str(knee)).replace("0.1 0.8", "0 0.4")
     text = QUADRUPED.replace("0.6 0 0 0.8", quaternion).replace(HOME, home)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         load(text.replace("-150 -5", "-150 0"))
     found = [str(each.message) for each in caught]
     assert len(found) == (named is not None) and all(named in message for message in found)
@@ -269,8 +268,7 @@ def test_the_robot_is_the_free_body_with_joints_or_what_is_attached_to_the_world
 def test_what_the_robot_does_not_have_is_named(load, mjcf, named):
     with warns(RobotWarning, named):
         load(mjcf)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RobotWarning)
+    with warnings.catch_warnings(action="error", category=RobotWarning):
         load(pendulum())
 
 

@@ -197,8 +197,7 @@ def test_coupled_joints_are_locked_where_their_leader_puts_them(urdf, posture, p
 
 
 def test_a_leader_moves_alone_only_if_its_followers_are_locked_by_name():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", RobotWarning)
+    with warnings.catch_warnings(action="error", category=RobotWarning):
         robot = fb.load_urdf(fingers("", FOLLOW), posture={"j0": 0.4}, locked=["j1"], feet=[])
     assert robot.joint_names == ("j0",) and robot.posture[7:] == 0.4
     with warns(RobotWarning, "j1"):
@@ -277,18 +276,15 @@ def test_a_quaternion_in_the_order_of_mujoco_is_reported(base, feet):
     with warns(RobotWarning, "go2", "x, y, z, w"):
         posture = [0.0, 0.0, 0.3, *base / np.linalg.norm(base), *joints]
         go2_again(name="go2", posture=posture, **options)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         posture[3:7] = np.roll(posture[3:7], -1)
         go2_again(posture=posture, **options)
 
 
-def test_motors_that_cannot_carry_a_floating_robot_are_reported_and_just_enough_is_no_fault():
-    go2 = judges.load("go2")
+def test_motors_that_cannot_carry_a_floating_robot_are_reported_and_just_enough_is_no_fault(go2):
     state, contacts = go2.standing(), judges.stance(go2)
     tau = fb.WholeBodyController(go2, contacts, fb.standing_tasks(state))(state.q, state.v).tau
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         go2_again(torque_limits=1.02 * np.abs(tau))
     with warns(RobotWarning, "robot", "FL_calf_joint"):
         go2_again(torque_limits=0.5 * np.abs(tau).max() * np.ones(12))
@@ -304,8 +300,7 @@ def test_lengths_that_are_not_in_metres_are_reported(unit, reported):
         lambda found: found[1] + " ".join(str(unit * float(x)) for x in found[2].split()),
         judges.load("solo12").urdf,
     )
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         fb.load_urdf(urdf, name="solo12")
     messages = [str(each.message) for each in caught if each.category is RobotWarning]
     assert len(messages) == reported

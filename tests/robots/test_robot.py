@@ -133,10 +133,9 @@ def test_a_robot_without_joints_falls_under_every_controller():
     assert joint_servo(state)(state.q, state.v, 0.0).tau.shape == (0,)
 
 
-def test_a_seed_may_be_any_whole_number():
-    robot = judges.load("go2")
+def test_a_seed_may_be_any_whole_number(go2):
     for seed in (3.0, np.int64(3), np.random.default_rng(3)):
-        assert_array_equal(robot.random_state(seed).q, robot.random_state(3).q)
+        assert_array_equal(go2.random_state(seed).q, go2.random_state(3).q)
 
 
 def test_joints_of_standing_and_random_states_keep_their_limits(robot):
@@ -154,19 +153,3 @@ def test_random_states_are_the_same_for_the_same_seed_and_differ_for_others(robo
     assert np.array_equal(robot.random_state(3).v, robot.random_state(3).v)
     assert not np.allclose(robot.random_state(3).q, robot.random_state(4).q)
     assert not np.allclose(robot.random_state(3).v, robot.random_state(4).v)
-
-
-def test_any_quadruped_of_example_robot_data_loads_once_its_feet_are_given():
-    robot = fb.load("anymal", feet=["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"], foot_radius=0.03)
-    assert [foot.radius for foot in robot.feet] == [0.03] * 4
-    positions = fb.Contacts.points(robot).positions(robot.standing())
-    assert np.allclose(positions[:, 2], 0.0, atol=1e-9)
-
-
-def test_limits_and_postures_that_are_given_replace_those_of_the_catalogue():
-    go2 = judges.load("go2")
-    q = go2.posture.copy()
-    q[7:] += 0.01
-    robot = fb.load("go2", torque_limits=5.0, posture=q)
-    assert np.array_equal(robot.torque_limits, np.full(12, 5.0))
-    assert np.allclose(robot.posture, q)

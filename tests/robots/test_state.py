@@ -14,13 +14,13 @@ import floatbase as fb
 N = 10
 
 
-name = judges.every_robot
+robot = judges.every_robot
 
 
-def test_frames_lie_in_the_world_where_mujoco_has_them(name):
-    robot, judge = judges.load(name), judges.mujoco_of(name)
+def test_frames_lie_in_the_world_where_mujoco_has_them(robot):
+    judge = judges.mujoco_of(robot.name)
     frames = [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]
-    for state in judges.states(name, N):
+    for state in judges.states(robot.name, N):
         judge.move_to(state)
         for frame in frames:
             placement = robot.model.frames[robot.frame_id(frame)].placement
@@ -33,9 +33,9 @@ def test_frames_lie_in_the_world_where_mujoco_has_them(name):
             assert np.allclose(state.point(frame, offset), p + R @ local, atol=1e-9)
 
 
-def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name):
-    robot, judge = judges.load(name), judges.mujoco_of(name)
-    for state in judges.states(name, N):
+def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(robot):
+    judge = judges.mujoco_of(robot.name)
+    for state in judges.states(robot.name, N):
         judge.move_to(state)
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
             linear, angular = judge.jacobian(frame, state.point(frame))
@@ -44,17 +44,16 @@ def test_frame_jacobians_agree_with_mujoco_in_the_world_aligned_frame(name):
             assert np.allclose(state.frame_velocity(frame), expected, atol=1e-9)
 
 
-def test_frame_drift_is_the_change_of_j_v_along_v(name):
-    robot = judges.load(name)
-    for state in judges.states(name, N):
+def test_frame_drift_is_the_change_of_j_v_along_v(robot):
+    for state in judges.states(robot.name, N):
         for frame in [foot.frame for foot in robot.feet] + ["base", robot.frames[-1]]:
             expected = judges.drift_of(lambda s, f=frame: s.frame_jacobian(f), state)
             assert np.allclose(state.frame_drift(frame), expected, atol=1e-7), frame
 
 
-def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(name):
-    judge = judges.mujoco_of(name)
-    for state in judges.states(name, N):
+def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_derivatives(robot):
+    judge = judges.mujoco_of(robot.name)
+    for state in judges.states(robot.name, N):
         judge.move_to(state)
         if (
             judge.robot.is_floating
@@ -68,21 +67,19 @@ def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_deriva
         assert np.allclose(state.com_drift, drift, atol=1e-7)
 
 
-def test_base_velocity_is_given_in_the_base_frame():
-    robot = judges.load("go2")
-    q = robot.standing().q.copy()
+def test_base_velocity_is_given_in_the_base_frame(go2):
+    q = go2.standing().q.copy()
     q[3:7] = [0.0, 0.0, np.sin(np.pi / 4), np.cos(np.pi / 4)]  # a quarter turn about z
-    v = np.zeros(robot.nv)
+    v = np.zeros(go2.nv)
     v[0], v[3] = 1.0, 2.0  # forwards, and rolling about the body's own x
-    state = fb.State(robot, q, v)
+    state = fb.State(go2, q, v)
     assert np.allclose(state.frame_velocity("base"), [0.0, 1.0, 0.0, 0.0, 2.0, 0.0], atol=1e-12)
 
 
-def test_the_base_quaternion_is_ordered_x_y_z_w():
-    robot = judges.load("go2")
-    q = robot.neutral().q.copy()
+def test_the_base_quaternion_is_ordered_x_y_z_w(go2):
+    q = go2.neutral().q.copy()
     q[3:7] = [np.sin(0.2), 0.0, 0.0, np.cos(0.2)]
-    R = fb.State(robot, q).frame_pose("base").rotation
+    R = fb.State(go2, q).frame_pose("base").rotation
     assert np.allclose(R, judges.rotation([0.4, 0.0, 0.0]), atol=1e-12)
 
 
@@ -96,8 +93,7 @@ def test_difference_undoes_integrate(seed, which):
     assert not np.allclose(state.difference(reached.q), dv, atol=1e-3)
 
 
-def test_a_state_computes_from_a_copy_and_gives_copies_of_its_poses(name):
-    robot = judges.load(name)
+def test_a_state_computes_from_a_copy_and_gives_copies_of_its_poses(robot):
     q, v = robot.standing().q.copy(), np.zeros(robot.nv)
     state = fb.State(robot, q, v)
     com = state.com.copy()
@@ -109,9 +105,8 @@ def test_a_state_computes_from_a_copy_and_gives_copies_of_its_poses(name):
     assert not np.allclose(state.frame_pose("base").translation, pose.translation)
 
 
-def test_a_state_answers_the_same_in_any_order_of_questions(name):
+def test_a_state_answers_the_same_in_any_order_of_questions(robot):
     """Pinocchio's algorithms write to one memory: none may change what another has left there."""
-    robot = judges.load(name)
     parts = ("M", "h", "com", "com_velocity", "com_drift", "com_jacobian", "joint_transforms")
     questions = [attrgetter(part) for part in parts]
     for frame in ("base", robot.frames[-1]):
@@ -128,8 +123,7 @@ def test_a_state_answers_the_same_in_any_order_of_questions(name):
         assert all(np.array_equal(found, expected) for found, expected in answers)  # still so
 
 
-def test_threads_may_ask_the_same_state(name):
-    robot = judges.load(name)
+def test_threads_may_ask_the_same_state(robot):
     states = [robot.random_state(seed) for seed in range(4)]
     expected = [robot.random_state(seed).frame_drift("base") for seed in range(4)]
 
@@ -140,8 +134,8 @@ def test_threads_may_ask_the_same_state(name):
         assert all(threads.map(ask, range(400)))
 
 
-def test_joint_transforms_are_where_mujoco_has_the_joints(name):
-    robot, judge = judges.load(name), judges.mujoco_of(name)
+def test_joint_transforms_are_where_mujoco_has_the_joints(robot):
+    judge = judges.mujoco_of(robot.name)
     state = robot.random_state(1)
     judge.move_to(state)
     for joint in robot.joint_names:
@@ -151,8 +145,8 @@ def test_joint_transforms_are_where_mujoco_has_the_joints(name):
         assert np.allclose(T[:3, :3], judge.data.xmat[body].reshape(3, 3), atol=1e-9)
 
 
-def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(name):
-    robot, step = judges.load(name), 1e-6
+def test_centroidal_matrix_and_drift_are_the_momentum_and_its_rate(robot):
+    step = 1e-06
     state = robot.random_state(3, 0.3)
 
     def momentum(q):

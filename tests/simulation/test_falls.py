@@ -131,7 +131,7 @@ def test_a_controller_that_fails_at_once_lets_the_robot_lie_down():
     assert record.final.q[2] < 0.5 * record.q[0, 2] and lowest(record.final) > -DEPTH
 
 
-def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row():
+def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row(go2):
     """Torques, forces and times are those of complete control steps."""
 
     class Breaks:
@@ -141,20 +141,18 @@ def test_an_actuator_that_fails_within_a_tick_leaves_no_half_row():
             self.steps += 1
             return tau if self.steps < 14 else np.full(12, np.nan)
 
-    robot = judges.load("go2")
     options = {"control_period": 5e-3, "actuators": Breaks(), "settling_time": 0.1}
-    record = fb.rollout(fb.Simulation(robot), judges.controller_of("go2"), 0.1, **options)
+    record = fb.rollout(fb.Simulation(go2), judges.controller_of("go2"), 0.1, **options)
     assert record.outcome == "controller failed" and len(record) == 2 + 20
     assert record.controller_off_time == pytest.approx(0.013)
     assert np.allclose(np.diff(record.time)[2:], 5e-3)
-    expected = np.clip(record.tau_desired[2], -robot.torque_limits, robot.torque_limits)
+    expected = np.clip(record.tau_desired[2], -go2.torque_limits, go2.torque_limits)
     assert np.allclose(record.tau[2], expected, atol=1e-9)
     assert np.abs(record.tau_desired[2]).max() > 1e-3
 
 
-def test_links_touch_from_a_fall_to_the_next_reset():
-    robot = judges.load("go2")
-    sim = fb.Simulation(robot)
+def test_links_touch_from_a_fall_to_the_next_reset(go2):
+    sim = fb.Simulation(go2)
     once = pushed("go2", 100.0, 90.0, sim=sim)
     sim.reset()
     assert not sim.link_collisions

@@ -4,10 +4,10 @@ import judges
 import mujoco
 import numpy as np
 import pytest
+from messages import refused
 
 import floatbase as fb
 from floatbase.errors import InputError
-from floatbase.robots import State
 from floatbase.simulation import Box, Ground
 
 ROUNDING = 1e-12
@@ -40,7 +40,7 @@ def test_height_and_normal_are_what_a_ray_from_above_meets(name):
     sim = fb.Simulation(judges.load("go2"), ground)
     aside = np.array(sim.robot.standing().q)
     aside[:3] += [-50.0, 0.0, 50.0]  # the robot is not between ray and ground
-    sim.reset(State(sim.robot, aside))
+    sim.reset(fb.State(sim.robot, aside))
     xy = np.random.default_rng(0).uniform([-0.5, -1.0], [2.5, 1.0], (200, 2))
     heights, normals = ground.height(xy), ground.normal(xy)
     for point, height, normal in zip(xy, heights, normals, strict=True):
@@ -75,12 +75,11 @@ def test_clearances_of_a_box_are_distances_from_its_nearest_face_or_edge():
     assert np.allclose(ground.clearances(points)[:, 0], np.array(points)[:, 2])
 
 
-def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane():
+def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane(go2):
     """A push, a slip and a fall included: boxes have the friction of planes and meet hulls, too."""
-    robot = judges.load("go2")
     grounds = Ground(0.3), Ground(0.3, offset=-1.0, boxes=[Box([-9, 9], [-9, 9], 0.0)])
     push = fb.Push([0.0, 60.0, 0.0], start=0.05, duration=0.1)
-    runs, sims = [], [fb.Simulation(robot, ground) for ground in grounds]
+    runs, sims = [], [fb.Simulation(go2, ground) for ground in grounds]
     for sim in sims:
         controller = judges.controller_of("go2")
         runs.append(fb.rollout(sim, controller, 0.3, [push]))
@@ -90,7 +89,7 @@ def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane():
     assert np.allclose(box.q, plane.q, atol=0.03)
     assert np.allclose(box.foot_positions, plane.foot_positions, atol=5e-3)
     impulses = [run.measured.sum(axis=0) * 1e-3 for run in runs]
-    assert np.allclose(*impulses, atol=0.01 * robot.weight)
+    assert np.allclose(*impulses, atol=0.01 * go2.weight)
     for sim in sims:
         sim.reset()
         record = fb.rollout(sim, judges.limp, 0.6, settling_time=1.0)
@@ -98,26 +97,25 @@ def test_a_robot_on_a_box_has_the_contacts_that_it_has_on_a_plane():
         assert 0.0 < sim.state.q[2] < 0.2, "the links lie on the ground"
 
 
-def test_measured_forces_carry_the_robot_across_the_edge_of_a_step():
+def test_measured_forces_carry_the_robot_across_the_edge_of_a_step(go2):
     """On an edge, contact normals are oblique; forces and mass times acceleration still agree."""
-    robot = judges.load("go2")
-    front = max(foot_x for foot_x in fb.Simulation(robot).contact_positions()[:, 0])
+    front = max(foot_x for foot_x in fb.Simulation(go2).contact_positions()[:, 0])
     for top in (0.0, 0.02):  # edges below the front feet, and against their sides
         sim = fb.Simulation(
-            robot,
+            go2,
             Ground(
                 offset=-0.1,
                 boxes=[Box([-2, front - 0.01], [-1, 1], 0.0), Box([front + 0.01, 2], [-1, 1], top)],
             ),
         )
-        sim.reset(robot.standing())
+        sim.reset(go2.standing())
         controller = judges.controller_of("go2")
         for _ in range(60):
             before = sim.state.com_velocity
             sim.step(controller(sim.q, sim.v, 0.0).tau)
-            accelerating = robot.mass * (sim.state.com_velocity - before) / sim.timestep
-            total = sim.contact_forces().sum(axis=0) + [0.0, 0.0, -robot.weight]
-            assert np.allclose(total, accelerating, atol=0.02 * robot.weight)
+            accelerating = go2.mass * (sim.state.com_velocity - before) / sim.timestep
+            total = sim.contact_forces().sum(axis=0) + [0.0, 0.0, -go2.weight]
+            assert np.allclose(total, accelerating, atol=0.02 * go2.weight)
         oblique = sim.contact_forces()[:2]
         assert np.any(np.abs(oblique) > 0.0)
 
@@ -148,25 +146,22 @@ def test_a_biped_starts_upright_on_a_slope_and_stands(name, axis, degrees):
 
 
 @pytest.mark.parametrize("ground", ["stairs down", "gap"])
-def test_a_robot_on_a_platform_starts_as_on_level_ground(ground):
-    robot = judges.load("talos")
-    sim = fb.Simulation(robot, GROUNDS[ground])
-    assert np.allclose(sim.state.q, robot.standing().q, atol=LENGTHS)
+def test_a_robot_on_a_platform_starts_as_on_level_ground(ground, talos):
+    sim = fb.Simulation(talos, GROUNDS[ground])
+    assert np.allclose(sim.state.q, talos.standing().q, atol=LENGTHS)
 
 
-def test_go2_starts_with_its_feet_on_boxes_of_different_heights():
-    robot = judges.load("go2")
-    sim = fb.Simulation(robot, Ground.stairs(1, 0.08, start=0.0))
+def test_go2_starts_with_its_feet_on_boxes_of_different_heights(go2):
+    sim = fb.Simulation(go2, Ground.stairs(1, 0.08, start=0.0))
     feet = sim.contact_positions()
     assert np.allclose(feet[:, 2], np.where(feet[:, 0] > 0.0, 0.08, 0.0), atol=LENGTHS)
     start = sim.state
-    controller = fb.WholeBodyController(robot, fb.Contacts.feet(robot), fb.standing_tasks(start))
+    controller = fb.WholeBodyController(go2, fb.Contacts.feet(go2), fb.standing_tasks(start))
     assert fb.rollout(sim, controller, 0.3).slip().max() < 2e-3
 
 
-def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has():
-    robot = judges.load("go2")
-    sim = fb.Simulation(robot, Ground.stairs(1, 0.5, start=1.0))
+def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has(go2):
+    sim = fb.Simulation(go2, Ground.stairs(1, 0.5, start=1.0))
     low = sim.state
     q = np.array(low.q)
     q[:3] += [2.0, 0.0, 0.5]
@@ -182,7 +177,6 @@ def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has():
     ("make", "number"),
     [
         (lambda: Box([1.0, 0.5], [0.0, 1.0], 0.1), "1.0, 0.5"),
-        (lambda: Box([0.0, 1.0], [0.0], 0.1), "(1,)"),
         (lambda: Ground(boxes=[0.1]), "0.1"),
         (lambda: Ground(boxes=Box([0.0, 1.0], [0.0, 1.0], 0.1)), "Box"),
         (lambda: Ground.stairs(0, 0.1), "0"),
@@ -195,16 +189,13 @@ def test_a_robot_that_climbs_has_not_fallen_and_one_that_lies_on_a_box_has():
     ],
 )
 def test_grounds_that_cannot_be_are_refused(make, number):
-    with pytest.raises(InputError) as raised:
-        make()
-    assert number in str(raised.value)
+    refused(make, InputError, number)
 
 
-def test_a_sole_beside_a_box_is_parallel_to_the_slope():
-    robot = judges.load("talos")
+def test_a_sole_beside_a_box_is_parallel_to_the_slope(talos):
     ground = Ground(normal=[0.0, -0.1, 1.0], boxes=[Box([-1.0, 1.0], [0.02, 1.0], 0.06)])
-    state = fb.Simulation(robot, ground=ground).state
-    for foot in robot.feet:
+    state = fb.Simulation(talos, ground=ground).state
+    for foot in talos.feet:
         corners = np.array([state.point(foot.frame, corner) for corner in foot.corners])
         assert np.allclose(corners[:, 2], ground.height(corners[:, :2]), rtol=0.0, atol=1e-8)
         middle = state.point(foot.frame, foot.middle)

@@ -245,12 +245,11 @@ def test_an_adapter_warns_about_differences_that_a_controller_should_know(dog, c
 
 
 @pytest.mark.parametrize("yaw", [0.0, 1.5])
-def test_a_controller_that_fails_with_mujocos_quaternion_asks_for_its_order(yaw):
-    robot = judges.load("go2")
-    controller, standing = judges.controller_of("go2"), robot.standing()
+def test_a_controller_that_fails_with_mujocos_quaternion_asks_for_its_order(yaw, go2):
+    controller, standing = judges.controller_of("go2"), go2.standing()
     q = np.array(standing.q)
     q[3:7] = [0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)]
-    sim = fb.Simulation(robot)
+    sim = fb.Simulation(go2)
     sim.reset(standing.replace(q=q))
 
     def confused(q: np.ndarray, v: np.ndarray, t: float) -> Command:

@@ -22,10 +22,7 @@ QUICK = {"resolution": STEP, "observation_time": WATCH, "start": 0.1, "progress"
 
 @pytest.fixture(scope="module")
 def standing() -> fb.WholeBodyController:
-    robot = judges.load("go2")
-    return fb.WholeBodyController(
-        robot, fb.Contacts.points(robot, 0.7), fb.standing_tasks(robot.standing())
-    )
+    return judges.controller_of("go2")
 
 
 @pytest.fixture(scope="module")

@@ -61,11 +61,10 @@ def test_a_loaded_run_has_the_same_robot(kind: str, tmp_path: Path) -> None:
     assert_array_equal(made.contact_positions(), saved.contact_positions())
 
 
-def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path) -> None:
-    robot = judges.load("go2")
+def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path, go2) -> None:
     ground = fb.Ground(0.8, boxes=[Box([1.0, 2.0], [-1.0, 1.0], 0.1)])
-    walk = Walk(robot, fb.Contacts.feet(robot, 0.6), Gait.trot(robot, start=0.01), (0.3, 0.0))
-    sim, push = fb.Simulation(robot, ground), fb.Push([0.0, 9.0, 0.0], 0.01, 0.02, "FL_foot")
+    walk = Walk(go2, fb.Contacts.feet(go2, 0.6), Gait.trot(go2, start=0.01), (0.3, 0.0))
+    sim, push = fb.Simulation(go2, ground), fb.Push([0.0, 9.0, 0.0], 0.01, 0.02, "FL_foot")
 
     def fails_late(q: Any, v: Any, t: float) -> Any:
         if t > 0.1:
@@ -74,8 +73,8 @@ def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path) -> None:
         return command
 
     run = fb.rollout(sim, fails_late, 0.2, [push], settling_time=0.02)
-    loaded = reloaded(run, tmp_path, robot=robot)
-    assert loaded.robot is robot
+    loaded = reloaded(run, tmp_path, robot=go2)
+    assert loaded.robot is go2
     for field in fields(fb.Rollout):
         one, other = getattr(loaded, field.name), getattr(run, field.name)
         if isinstance(other, np.ndarray):
@@ -96,18 +95,17 @@ def test_a_loaded_walk_has_all_that_was_recorded(tmp_path: Path) -> None:
     assert loaded.ground.height([1.5, 0.0]) == 0.1 and loaded.ground.mus == [0.8]
 
 
-def test_constraints_keep_their_forces_and_lose_their_functions(tmp_path: Path) -> None:
+def test_constraints_keep_their_forces_and_lose_their_functions(tmp_path: Path, go2) -> None:
     class Lift(PointContact):
         def constraint(self, state: fb.State, t: float = 0.0) -> Any:
             A, b = super().constraint(state, t)
             return A, b + [0.0, 0.0, 0.1]
 
-    robot = judges.load("go2")
-    feet = [Lift(foot.frame, mu=0.4, radius=foot.radius) for foot in robot.feet]
+    feet = [Lift(foot.frame, mu=0.4, radius=foot.radius) for foot in go2.feet]
     contacts = fb.Contacts([*feet, fixed_frame("base")])
-    control = fb.WholeBodyController(robot, contacts, fb.standing_tasks(robot.standing()))
+    control = fb.WholeBodyController(go2, contacts, fb.standing_tasks(go2.standing()))
     with warns(SimulationWarning, "bolts of base"):
-        run = fb.rollout(fb.Simulation(robot), control, 0.005)
+        run = fb.rollout(fb.Simulation(go2), control, 0.005)
     with warns(SimulationWarning, "FL_foot", "PointContact"):
         loaded = reloaded(run, tmp_path)
     assert loaded.contacts.names == contacts.names and loaded.contacts["FL_foot"].mu == 0.4

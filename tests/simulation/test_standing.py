@@ -62,15 +62,6 @@ def test_after_a_push_of_30_newtons_go2_comes_back():
     assert np.linalg.norm(record.final.v) < 1e-2
 
 
-def test_under_the_push_the_ground_pushes_back():
-    record = stood("go2", 2.0, push=True)
-    sideways = record.measured.reshape(len(record), 4, 3).sum(axis=1)[:, :2]
-    before = (record.time > 0.2) & (record.time < 0.49)
-    during = (record.time > 0.53) & (record.time < 0.59)
-    assert np.abs(sideways[before]).max() < 1.0
-    assert np.all(sideways[during] @ [0.5, 0.87] < -5.0)
-
-
 @pytest.mark.parametrize(("backend", "period"), [("compiled", 0.001), ("reference", 0.005)])
 def test_solo8_pushed_out_of_its_singular_stance_stands_on(backend, period):
     """Near the symmetric stance, J has small singular values that are useless.

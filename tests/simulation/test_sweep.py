@@ -2,7 +2,6 @@
 
 import linecache
 import os
-import resource
 import subprocess
 import sys
 import threading
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from disk import full_disk
 from messages import raises, warns
 from pandas.testing import assert_frame_equal
 
@@ -112,13 +112,9 @@ def test_a_sweep_resumes_after_a_full_disk_and_computes_failed_points_again(tmp_
     first = fb.sweep(root, grid, file=file, workers=1, progress=False)
     assert first["error"].isna().tolist() == [True, False, True]
     (tmp_path / "repaired").touch()
-    size, limits = file.stat().st_size, resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size + 20, limits[1]))  # like a full disk
-    try:
-        with raises(InputError, "rows.jsonl", "File too large"):
-            fb.sweep(root, grid, file=file, workers=1, progress=False)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    size = file.stat().st_size
+    with full_disk(size + 20), raises(InputError, "rows.jsonl", "File too large"):
+        fb.sweep(root, grid, file=file, workers=1, progress=False)
     assert file.stat().st_size == size + 20, "the last row was written in part"
     second = fb.sweep(root, grid, file=file, workers=1, progress=False)
     assert second["result"].tolist() == [0.0, 1.0, 2.0] and second["error"].isna().all()

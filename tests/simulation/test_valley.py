@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import floatbase as fb
-from floatbase.simulation import Ground
 
 LENGTHS = 1e-9  # m: error of Newton's method, and rounding
 # fraction of the weight: difference of planned and measured forces after one second of standing
@@ -48,7 +47,7 @@ def stood(sim: fb.Simulation, contacts: fb.Contacts, state: fb.State, **options:
 @pytest.mark.parametrize("shift", [0.0, 0.04])  # m, of the valley's bottom to the left
 def test_go2_stands_in_a_valley_with_a_level_base(shift):
     robot, normals = judges.load("go2"), np.array(sides(20.0))
-    sim = fb.Simulation(robot, Ground(normal=normals, offset=shift * normals[:, 1]))
+    sim = fb.Simulation(robot, fb.Ground(normal=normals, offset=shift * normals[:, 1]))
     start = sim.state
     expected = robot.standing().frame_pose("base").rotation
     assert np.allclose(start.frame_pose("base").rotation, expected, atol=LENGTHS)
@@ -68,7 +67,7 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides():
     home, bottom = robot.standing(), radius / np.cos(np.deg2rad(30.0))
     feet = [foot.frame for foot in robot.feet]
     centres = {foot: home.point(foot) * [1, 0, 0] + [0, 0, bottom] for foot in feet}
-    sim = fb.Simulation(robot, Ground(normal=sides(30.0)))
+    sim = fb.Simulation(robot, fb.Ground(normal=sides(30.0)))
     sim.reset(with_feet(robot, home.q[:3] + [0.0, 0.0, 0.01], centres))
     balls = [sim.data.geom(name).xpos for name in sim.point_names]
     assert np.allclose(sim.ground.clearances(balls), radius, atol=LENGTHS)
@@ -81,20 +80,6 @@ def test_a_foot_in_the_bottom_of_a_valley_gets_the_forces_of_both_sides():
     expected = record.planned[-1].reshape(4, 3)[:, 2]
     assert np.allclose(forces[:, 2], expected, atol=0.1 * robot.weight)
     assert forces[:, 2].sum() == pytest.approx(robot.weight, rel=0.1)
-
-
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_plane_with_an_offset_carries_a_robot_as_one_through_the_origin_does(name):
-    robot, normal, offset = judges.load(name), np.array([0.1, 0.05, 1.0]), 0.3
-    near, far = (fb.Simulation(robot, Ground(normal=normal, offset=at)) for at in (0.0, offset))
-    shift = offset * near.ground.normals[0]
-    assert np.allclose(far.contact_positions(), near.contact_positions() + shift, atol=LENGTHS)
-    for sim in (near, far):
-        for _ in range(20):
-            sim.step(np.zeros(robot.d))
-    assert np.any(near.contact_forces())
-    expected = near.contact_forces()
-    assert np.allclose(far.contact_forces(), expected, rtol=1e-3, atol=1e-3 * robot.weight)
 
 
 @pytest.mark.parametrize("name", ["go2", "talos"])

@@ -5,21 +5,11 @@ import pytest
 from browsers import launched
 
 from floatbase.dynamics import Contacts
-from floatbase.robots import load
+from floatbase.playground import Playground
 from floatbase.viewer import Viewer
 from floatbase.viewer.transport.window import Window
 
 from .looks import CONTEXTS, SIZE
-
-
-@pytest.fixture(scope="session")
-def go2():
-    return load("go2")
-
-
-@pytest.fixture(scope="session")
-def standing(go2):
-    return go2.standing()
 
 
 @pytest.fixture
@@ -46,6 +36,15 @@ def viewer(go2):
     view = Viewer(go2)
     yield view
     view.close()
+
+
+@pytest.fixture
+def field(go2):
+    """A playground that runs."""
+    started = Playground(go2)
+    started.start()
+    yield started
+    started.close()
 
 
 @pytest.fixture(scope="package")

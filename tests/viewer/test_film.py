@@ -16,7 +16,6 @@ import floatbase as fb
 from floatbase.control import JointLimits
 from floatbase.errors import InputError, MissingDependencyError, ViewerError
 from floatbase.lessons import ConstantTorques
-from floatbase.simulation import Push
 
 pytestmark = pytest.mark.front_end
 
@@ -29,7 +28,7 @@ def view(request):
     robot = fb.load("go2")
     tasks = fb.standing_tasks(robot.standing())
     controller = fb.WholeBodyController(robot, fb.Contacts.points(robot), tasks)
-    run = fb.rollout(fb.Simulation(robot), controller, 0.2, [Push((0.0, 400.0, 0.0), 0.05, 0.1)])
+    run = fb.rollout(fb.Simulation(robot), controller, 0.2, [fb.Push((0.0, 400.0, 0.0), 0.05, 0.1)])
     view = fb.Viewer(robot)
     view.play(run, speed=0.5, follow=False)
     request.addfinalizer(view.close)
@@ -95,12 +94,11 @@ def test_a_machine_without_a_browser_is_reported(view, tmp_path, monkeypatch):
 
 
 @needs_chromium
-def test_a_gif_keeps_colours_that_appear_after_its_first_picture(tmp_path):
-    robot = fb.load("go2")
-    standing, q = robot.standing(), np.array(robot.standing().q)
-    q[7 + robot.joint_names.index("FL_calf_joint")] = JointLimits.of(robot).upper[2]
-    with closing(fb.Viewer(robot)) as view:
-        pictures = [view.painter.picture(state) for state in (standing, fb.State(robot, q))]
+def test_a_gif_keeps_colours_that_appear_after_its_first_picture(tmp_path, go2):
+    standing, q = go2.standing(), np.array(go2.standing().q)
+    q[7 + go2.joint_names.index("FL_calf_joint")] = JointLimits.of(go2).upper[2]
+    with closing(fb.Viewer(go2)) as view:
+        pictures = [view.painter.picture(state) for state in (standing, fb.State(go2, q))]
         view.show(standing)  # places the camera
         view.play_pictures([0.0, 0.2, 0.4], [*pictures, pictures[1]])
         with Image.open(view.save(tmp_path / "limit.gif", size=SIZE)) as gif:

@@ -10,11 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.behaviours import Gait, Walk, capture_point
-from floatbase.dynamics import Contacts
 from floatbase.errors import InputError, UnknownNameError
-from floatbase.robots import State
-from floatbase.simulation import Simulation
-from floatbase.viewer import Viewer
 from floatbase.viewer.export import recording
 
 from .looks import vertices
@@ -29,9 +25,9 @@ SWING, START = 0.2, 0.3  # s
 def walked(go2):
     """Return a trot of go2 with four swings; two feet are in the air at the end of the record."""
     gait = Gait.trot(go2, swing=SWING, start=START)
-    walk = Walk(go2, Contacts.feet(go2, mu=0.6), gait, velocity=(0.2, 0.0))
+    walk = Walk(go2, fb.Contacts.feet(go2, mu=0.6), gait, velocity=(0.2, 0.0))
     push = fb.Push([0.0, 40.0, 0.0], start=0.5)
-    return fb.rollout(Simulation(go2), walk, START + 4.5 * SWING, [push], 2e-3), walk
+    return fb.rollout(fb.Simulation(go2), walk, START + 4.5 * SWING, [push], 2e-3), walk
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +35,8 @@ def biped():
     """Return a walk of talos that turns left; one foot is in the air at the end of the record."""
     robot = fb.load("talos")
     gait = Gait.walk(robot, start=0.1)
-    walk = Walk(robot, Contacts.feet(robot, mu=0.6), gait, (0.2, 0.0), yaw_rate=0.4)
-    return fb.rollout(Simulation(robot), walk, 0.4, control_period=4e-3), walk
+    walk = Walk(robot, fb.Contacts.feet(robot, mu=0.6), gait, (0.2, 0.0), yaw_rate=0.4)
+    return fb.rollout(fb.Simulation(robot), walk, 0.4, control_period=4e-3), walk
 
 
 def test_marks_are_where_the_walk_plans(viewer, walked):
@@ -102,13 +98,13 @@ def test_a_stored_step_is_drawn_as_it_was_planned(viewer, walked):
 
 
 def test_a_walk_has_no_marks_before_its_first_control_step(viewer, go2, standing):
-    walk = Walk(go2, Contacts.feet(go2), Gait.trot(go2))
+    walk = Walk(go2, fb.Contacts.feet(go2), Gait.trot(go2))
     assert viewer.walk_overlay(walk, standing) == {} and walk.time is None
 
 
 def test_soles_are_outlined_with_position_and_rotation_at_touchdown(biped):
     run, walk = biped
-    with closing(Viewer(run.robot)) as viewer:
+    with closing(fb.Viewer(run.robot)) as viewer:
         look = viewer.walk_overlay(walk, run.final)
     (foot,) = walk.swings
     outline = vertices(look[f"foothold/{foot}"])[:, :2]
@@ -172,7 +168,7 @@ def test_a_followed_path_is_smooth_without_the_sway_of_steps():
 def test_the_grounds_lines_reach_as_far_as_the_robot_walks(viewer, standing):
     q = standing.q.copy()
     q[:2] = 40.0, -21.0
-    viewer.show(State(viewer.robot, q))
+    viewer.show(fb.State(viewer.robot, q))
     lines = vertices(viewer.renderer.picture["ground"])
     low, high = lines.min(axis=0), lines.max(axis=0)
     assert (low[:2] < q[:2] - 3.0).all() and (high[:2] > q[:2] + 3.0).all()

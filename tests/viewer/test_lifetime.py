@@ -14,7 +14,7 @@ import time
 import numpy as np
 import pytest
 from browsers import CHROMIUM, FLAGS
-from jupyter_client.manager import start_new_kernel
+from jupyter_client.manager import run_kernel
 from waiting import PATIENCE, until
 
 from floatbase.viewer.scene import protocol
@@ -83,35 +83,6 @@ def test_a_page_that_never_reads_is_dropped(window, sleeper, monkeypatch):
     until(lambda: len(os.listdir("/dev/fd")) < files)
 
 
-class Kernel:
-    """A separate Jupyter kernel."""
-
-    def __init__(self):
-        self.manager, self.client = start_new_kernel(kernel_name="python3")
-
-    def run(self, code):
-        """Run code; return what it prints, and the name of its error."""
-        return "".join(self.told(self.client.execute(code)))
-
-    def told(self, request):
-        """Yield what a request prints, and the name of its error, until it is finished."""
-        while True:
-            message = self.client.get_iopub_msg(timeout=PATIENCE)
-            if message["parent_header"].get("msg_id") != request:
-                continue
-            content = message["content"]
-            if message["msg_type"] == "stream":
-                yield content["text"]
-            elif message["msg_type"] == "error":
-                yield content["ename"]
-            elif message["msg_type"] == "status" and content["execution_state"] == "idle":
-                return
-
-    def close(self):
-        self.client.stop_channels()
-        self.manager.shutdown_kernel(now=True)
-
-
 IN_A_NOTEBOOK = """import floatbase as fb
 from floatbase.lessons import live_run, push_panel
 from floatbase.playground import playground
@@ -132,13 +103,19 @@ PORTS = (
 
 @pytest.mark.front_end
 def test_a_kernel_that_shows_pictures_listens_where_jupyter_does_and_nowhere_else():
-    kernel = Kernel()
-    try:
-        jupyters = json.loads(kernel.run(PORTS))
+    with run_kernel(kernel_name="python3") as client:
+
+        def printed(code):
+            """What the kernel prints, and the name of its error."""
+            said = []
+            client.execute_interactive(
+                code, output_hook=lambda one: said.append(one["content"]), timeout=PATIENCE
+            )
+            return "".join(one.get("text") or one.get("ename", "") for one in said)
+
+        jupyters = json.loads(printed(PORTS))
         assert jupyters
-        assert kernel.run(IN_A_NOTEBOOK).endswith("Viewer(go2) Playground(go2) NotebookWidget\n")
-        assert json.loads(kernel.run(PORTS)) == jupyters
-        port = int(kernel.run("print(view.window.port)"))  # whoever asks gets one
-        assert json.loads(kernel.run(PORTS)) == sorted([*jupyters, port])
-    finally:
-        kernel.close()
+        assert printed(IN_A_NOTEBOOK).endswith("Viewer(go2) Playground(go2) NotebookWidget\n")
+        assert json.loads(printed(PORTS)) == jupyters
+        port = int(printed("print(view.window.port)"))  # whoever asks gets one
+        assert json.loads(printed(PORTS)) == sorted([*jupyters, port])

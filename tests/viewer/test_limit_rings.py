@@ -12,10 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import floatbase as fb
 from floatbase.control import JointLimits
-from floatbase.dynamics import Contacts
 from floatbase.errors import InputError
-from floatbase.robots import State, load
-from floatbase.viewer import Viewer
 from floatbase.viewer.export.recording import joint_limits_at
 from floatbase.viewer.scene.colours import ALARM, WARNING
 from floatbase.viewer.scene.threejs import colour_number
@@ -29,7 +26,7 @@ def at_fraction(robot, joint, fraction):
     """Return the standing state with a joint at a fraction of its range."""
     i, limits, q = robot.joint_names.index(joint), JointLimits.of(robot), robot.standing().q.copy()
     q[robot.nq - robot.d + i] = (1.0 - fraction) * limits.lower[i] + fraction * limits.upper[i]
-    return State(robot, q)
+    return fb.State(robot, q)
 
 
 def rings(paths):
@@ -53,7 +50,7 @@ def commands():
 @pytest.fixture(scope="module")
 def stretched(go2, commands):
     """A run in which the robot rises until its knees are at their limits."""
-    standing, contacts = go2.standing(), Contacts.points(go2, mu=0.7)
+    standing, contacts = go2.standing(), fb.Contacts.points(go2, mu=0.7)
     rise = fb.CoMTask(standing.com + [0.0, 0.0, 0.3])
     tasks = [rise if isinstance(t, fb.CoMTask) else t for t in fb.standing_tasks(standing)]
     controller = fb.WholeBodyController(go2, contacts, tasks)
@@ -77,16 +74,15 @@ def test_a_joint_near_a_limit_has_a_ring(viewer, go2, fraction, is_near):
     assert rings(viewer.renderer.picture) == {}
 
 
-@pytest.mark.parametrize("name", ["go2", "talos"])
-def test_a_ring_is_around_the_axis_of_its_joint(name):
-    robot = load(name)
-    with closing(Viewer(robot)) as view:
+@pytest.mark.parametrize("robot", ["go2", "talos"], indirect=True)
+def test_a_ring_is_around_the_axis_of_its_joint(robot):
+    with closing(fb.Viewer(robot)) as view:
         for joint in robot.joint_names[:7]:
             state = at_fraction(robot, joint, 0.99)
             matrix = view.show(state).renderer.picture[f"near_limit/{joint}"].matrix
             index, turn = robot.model.getJointId(joint), np.zeros(robot.nv)
             turn[robot.model.idx_vs[index]] = 0.1
-            turned = State(robot, pin.integrate(robot.model, state.q, turn))
+            turned = fb.State(robot, pin.integrate(robot.model, state.q, turn))
             before, after = (at.joint_transforms[index] for at in (state, turned))
             axis = pin.log3(after[:3, :3] @ before[:3, :3].T) / 0.1
             assert_allclose(matrix[:3, 3], before[:3, 3], atol=1e-9)
@@ -152,7 +148,7 @@ def test_limits_may_be_given_and_arguments_that_do_not_fit_are_refused(viewer, g
     assert rings(viewer.renderer.picture) == {}
     for wrong, *named in (
         (lambda: viewer.show(standing, joint_limits="robot"), "joint_limits", "robot"),
-        (lambda: viewer.show(standing, joint_limits=JointLimits.of(load("ur5"))), 6, 12),
+        (lambda: viewer.show(standing, joint_limits=JointLimits.of(fb.load("ur5"))), 6, 12),
         (lambda: viewer.show(standing, qdd=np.zeros(12)), "qdd", 12, 18),
         (lambda: viewer.show(standing, qdd=np.full(18, np.nan)), "qdd", np.nan),
     ):

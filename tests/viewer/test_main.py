@@ -126,28 +126,20 @@ def test_the_end_of_the_program_ends_the_wait_for_a_page(go2):
         assert playground.run.status == "paused"
 
 
-@pytest.fixture
-def playground(go2):
-    started = Playground(go2)
-    started.start()
-    yield started
-    started.close()
-
-
-def test_the_controls_reach_the_robot(page, playground, go2):
-    session, run = playground.session, playground.run
+def test_the_controls_reach_the_robot(page, field, go2):
+    session, run = field.session, field.run
 
     def drawn():
-        return {path for path in playground.view.renderer.picture if path.startswith("measured/")}
+        return {path for path in field.view.renderer.picture if path.startswith("measured/")}
 
-    page.goto(playground.url)
+    page.goto(field.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control(page, "CoM x [cm]", "setValue(4)")
     eventually(page, lambda: abs(session.sim.state.com[0] - go2.standing().com[0] - 0.04) < 0.01)
     control(page, "facets", "setValue(6)")
     control(page, "friction μ model", "setValue(0.3)")
     eventually(page, lambda: abs(session.settings.friction[0] - 0.3) < 1e-9)
-    eventually(page, lambda: (session.settings.facets, playground.view.painter.facets) == (6, 6))
+    eventually(page, lambda: (session.settings.facets, field.view.painter.facets) == (6, 6))
     picture(page, "bare_page")
     control(page, "pause", "fire()")
     eventually(page, lambda: run.status == "paused")
@@ -160,17 +152,17 @@ def test_the_controls_reach_the_robot(page, playground, go2):
 
 
 @pytest.mark.front_end
-def test_the_page_makes_the_robot_walk_and_stand_where_it_is(page, playground):
+def test_the_page_makes_the_robot_walk_and_stand_where_it_is(page, field):
     def place():
-        return playground.session.last.final.com if playground.session.last else np.zeros(3)
+        return field.session.last.final.com if field.session.last else np.zeros(3)
 
-    page.goto(playground.url)
+    page.goto(field.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['gait']")
     control(page, "velocity x [m/s]", "setValue(0.5)")
     control(page, "gait", "setValue(2)")
     eventually(page, lambda: place()[0] > 0.3)
     control(page, "gait", "setValue(0)")
-    eventually(page, lambda: len(playground.session.last.contacts_at(-1)) == 4)
+    eventually(page, lambda: len(field.session.last.contacts_at(-1)) == 4)
     stopped = place()
     control(page, "CoM z [cm]", "setValue(-2)")
     eventually(page, lambda: place()[2] < stopped[2] - 0.01)
@@ -180,8 +172,8 @@ def test_the_page_makes_the_robot_walk_and_stand_where_it_is(page, playground):
 
 
 @pytest.mark.front_end
-def test_the_page_draws_the_push_and_shows_what_stopped_the_run(page, playground):
-    page.goto(playground.url)
+def test_the_page_draws_the_push_and_shows_what_stopped_the_run(page, field):
+    page.goto(field.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['push']")
     control(page, "towards [°]", "setValue(-90)")
     control(page, "push [N]", "setValue(40)")
@@ -192,23 +184,23 @@ def test_the_page_draws_the_push_and_shows_what_stopped_the_run(page, playground
     push = "Date.now() % 1000 < 50 && viewer.gui_controllers['push'].fire()"
     seen = f"({push}, {turned}) && Array.from({drawn}.matrix.elements.slice(8, 11))"
     arrow = page.wait_for_function(seen).json_value()
-    assert_allclose(arrow, [0, -40 * playground.view.scale, 0], atol=1e-6)
+    assert_allclose(arrow, [0, -40 * field.view.scale, 0], atol=1e-6)
     page.wait_for_function(f"{drawn}.children.length == 0")
-    playground.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
+    field.run.push([0.0, 0.0, -1200.0], duration=0.3)  # harder than the handle can
     title = "document.getElementById('title').textContent"
     page.wait_for_function(f"{title}.includes('fell: press reset')")
     control(page, "reset", "fire()")
     page.wait_for_function(f"!{title}.includes('fell')")
-    assert playground.run.status == "running"
+    assert field.run.status == "running"
 
 
 @pytest.mark.filterwarnings("error")  # as an exception in the run's thread would be
-def test_a_window_that_closes_first_stops_the_run(playground):
-    until(lambda: playground.session.last is not None)
-    playground.view.close()
-    until(lambda: playground.run.status != "running")
-    assert "window" in playground.run.reason
-    playground.run.close()
+def test_a_window_that_closes_first_stops_the_run(field):
+    until(lambda: field.session.last is not None)
+    field.view.close()
+    until(lambda: field.run.status != "running")
+    assert "window" in field.run.reason
+    field.run.close()
 
 
 def test_the_pace_is_simulated_time_over_time():

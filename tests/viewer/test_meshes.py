@@ -34,11 +34,10 @@ def test_light_meshes_are_under_400_kb_and_good_triangles():
             assert np.all(np.isfinite(mesh.vertices)), name
 
 
-@pytest.mark.parametrize("name", judges.sampled(catalogue(), "go2", "ur5"))
-def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(name):
+@pytest.mark.parametrize("robot", judges.sampled(catalogue(), "go2", "ur5"), indirect=True)
+def test_every_visual_of_the_original_is_read_and_light_meshes_fill_the_same_boxes(robot):
     pytest.importorskip("trimesh", reason="the originals are read with trimesh")
     pytest.importorskip("collada", reason="the originals are read with pycollada")
-    robot = load(name)
     folders = [str(folder) for folder in robot.package_dirs]
     found = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.VISUAL, package_dirs=folders)
     visuals = {(one.parentJoint, Path(one.meshPath).stem) for one in found.geometryObjects}
@@ -189,8 +188,7 @@ def test_meshes_are_found_in_the_package_around_the_file(tmp_path):
             f"file://{file.parents[1]}/part.dae",
         ):
             file.write_text(single_link(name), encoding="utf-8")
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")
+            with warnings.catch_warnings(action="error"):
                 (mesh,) = robot_meshes(load_urdf(file))
             assert len(mesh.faces) == 4, name
 

@@ -30,14 +30,6 @@ ENDS = """() => {
 }"""
 
 
-@pytest.fixture
-def field(go2):
-    started = Playground(go2)
-    started.start()
-    yield started
-    started.close()
-
-
 def opened(page, field):
     page.goto(field.url)
     page.wait_for_function("window.viewer && viewer.gui_controllers['show cones']")

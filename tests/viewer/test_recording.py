@@ -15,8 +15,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 import floatbase as fb
 from floatbase.dynamics import Contacts, LinearConstraint, fixed_frame, rigid_between
 from floatbase.errors import InputError, UnknownNameError, ViewerError
-from floatbase.robots import State, catalogue, load
-from floatbase.simulation import Push, Rollout
 from floatbase.viewer import Viewer, plots
 from floatbase.viewer.export import recording
 from floatbase.viewer.scene import protocol
@@ -45,9 +43,9 @@ def record(robot, duration=2.0, walk=0.0):
     flat = forces.reshape(time.size, contacts.k)
     zeros = np.zeros((time.size, robot.d))
     feet = np.tile(contacts.positions(state), (time.size, 1, 1))
-    return Rollout(
+    return fb.Rollout(
         robot, contacts, time, q, np.zeros((time.size, robot.nv)), zeros, zeros, flat, flat, feet,
-        (Push([0.0, 30.0, 0.0], start=0.3, duration=0.2),), "completed",
+        (fb.Push([0.0, 30.0, 0.0], start=0.3, duration=0.2),), "completed",
     )  # fmt: skip
 
 
@@ -67,11 +65,10 @@ def numbers(packed):
     return np.frombuffer(packed.data, "<f4") if is_packed else np.array(packed)
 
 
-def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(viewer, go2):
+def test_a_rollout_brings_its_stairs_unless_the_viewer_has_a_ground(viewer, go2, standing):
     stairs = fb.Ground.stairs(2, 0.1, 0.3, 0.5)
     sim = fb.Simulation(go2, stairs)
-    state = go2.standing()
-    controller = fb.WholeBodyController(go2, fb.Contacts.feet(go2), fb.standing_tasks(state))
+    controller = fb.WholeBodyController(go2, fb.Contacts.feet(go2), fb.standing_tasks(standing))
     run = fb.rollout(sim, controller, 0.01)
     assert run.ground is stairs
     viewer.play(run)
@@ -212,13 +209,12 @@ def on_its_feet(robot):
     return make(robot, mu=0.6) if robot.feet else Contacts.none()
 
 
-@pytest.mark.parametrize("name", judges.sampled(catalogue(), "talos"))
-def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_to_less_than_two(name, tmp_path):
-    robot = load(name)
+@pytest.mark.parametrize("robot", judges.sampled(fb.catalogue(), "talos"), indirect=True)
+def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_to_less_than_two(robot, tmp_path):
     viewer, contacts = Viewer(robot), on_its_feet(robot)
     n = contacts.n_points
     forces = np.tile([0.0, 0.0, robot.weight / max(n, 1)], (n, 1))
-    viewer.show(robot.standing(), contacts, forces, forces, support=n > 2, title=name)
+    viewer.show(robot.standing(), contacts, forces, forces, support=n > 2, title=robot.name)
     saved = viewer.save(tmp_path / "still.html")
     assert saved.stat().st_size < 1e6
     assert re.findall(r"(?:src|href)=\"(?!data:).*?\"", saved.read_text()) == []
@@ -229,7 +225,7 @@ def test_a_robot_saves_to_less_than_a_megabyte_and_ten_seconds_to_less_than_two(
 
 
 def test_wrong_records_and_file_names_are_refused(viewer, go2, standing, tmp_path):
-    refused(lambda: viewer.play(record(load("solo12"))), InputError, "go2", "solo12")
+    refused(lambda: viewer.play(record(fb.load("solo12"))), InputError, "go2", "solo12")
     refused(lambda: viewer.play(record(go2, duration=0.0)), InputError)
     refused(lambda: viewer.play(record(go2), speed=0), InputError, "speed", 0)
     refused(lambda: viewer.save(tmp_path / "x.html"), ViewerError, "show", "play")
@@ -295,7 +291,7 @@ def test_the_camera_goes_with_the_robot(page, viewer, go2, standing):
     q = standing.q.copy()
     for moved in (0.1, 0.4):
         q[0] = standing.q[0] + moved
-        viewer.show(State(go2, q), title=f"{moved}")
+        viewer.show(fb.State(go2, q), title=f"{moved}")
         settle(page, f"{moved}")
     after = page.evaluate(TARGET)
     assert after[0] - before[0] == pytest.approx(0.4, abs=STEP)

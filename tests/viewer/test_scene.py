@@ -337,13 +337,12 @@ def test_only_a_call_of_camera_moves_the_camera_again(viewer, go2, standing):
     assert looked() == before
 
 
-def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu():
-    robot = load("talos")
-    contacts = Contacts.flat_feet(robot, mu=0.7)
-    corners = contacts.positions(robot.standing())[:4]
+def test_cones_at_the_corners_of_a_flat_foot_are_small_but_open_by_mu(talos):
+    contacts = Contacts.flat_feet(talos, mu=0.7)
+    corners = contacts.positions(talos.standing())[:4]
     nearest = min(np.linalg.norm(a - b) for i, a in enumerate(corners) for b in corners[:i])
-    with closing(Viewer(robot)) as view:
-        view.show(robot.standing(), contacts)
+    with closing(Viewer(talos)) as view:
+        view.show(talos.standing(), contacts)
         cones = matrices(view, "/meshcat/cone/")
     assert len(cones) == 8
     for matrix in cones.values():
@@ -394,11 +393,9 @@ def test_wrong_input_is_refused_by_name(viewer, go2, standing, contacts):
         (lambda: viewer.show(standing, ground_position=[0.0, 1.0]), "ground_position", 3, 2),
         (lambda: viewer.camera("above"), "above", "front"),
         (lambda: viewer.camera(90.0), 90, "View"),
-        (lambda: Viewer("go2"), "robot", "Robot", "go2"),
         (lambda: Viewer(go2, background="pink"), "background", "pink", "white", "light", "dark"),
         (lambda: Viewer(go2, ground=[1, 0, 0]), "ground", 1),
         (lambda: Viewer(go2, facets=2), "facets", 2),
-        (lambda: Viewer(go2, scale=-1), "scale", -1),
     ):
         refused(wrong, InputError, *named)
     viewer.close()

@@ -147,15 +147,6 @@ def test_fifty_windows_opened_and_dropped_leave_no_thread_no_port_and_no_process
     assert {child.pid for child in psutil.Process().children(recursive=True)} <= children
 
 
-def test_a_closed_window_refuses_updates():
-    window = Window()
-    window.close()
-    window.close()
-    assert not window.is_open
-    with pytest.raises(ViewerError):
-        window.put(UPDATES)
-
-
 def test_a_port_that_is_taken_or_none_is_an_error(window):
     refused(lambda: Window(port=window.port), ViewerError, "port", window.port)
     for port in (-1, 65536, 3.5, "8000", True):

@@ -30,7 +30,7 @@ _MAX_EXTENSION = 0.9
 # sine of the angle between the desired velocity and the directions in which a leg moves its foot
 _MAX_SIDEWAYS = 0.5
 _GRID_SIZE = 25  # positions of a joint that the search for the longest leg tries
-_SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot of the catalogue
+_SWEEPS = 2  # over the joints of a leg: more find no longer leg for any robot in the catalogue
 
 
 def speed_fractions(

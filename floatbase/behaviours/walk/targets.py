@@ -27,7 +27,7 @@ Motion: TypeAlias = tuple[Array, Array, Array]  # position, velocity, accelerati
 # (3,), in the world frame [m]
 Adjustment: TypeAlias = Callable[[StepPlan, Path, Array, Array, float], Mapping[str, npt.ArrayLike]]
 _LEAN_RATE = 15.0  # 1/s: the body leans with stairs 0.2 s later than they rise
-UNBOUNDED = 1e6  # N: a bound that no robot of the catalogue reaches
+UNBOUNDED = 1e6  # N: a bound that no robot in the catalogue reaches
 _MAX_HEIGHT_CHANGE, _MAX_PITCH = 1.0, 1.0  # m, rad: larger numbers must be in another unit
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -93,12 +93,12 @@ def write_gradebook(
     """
     header, rows = _read_roster(kind, roster)
     if table.exists() and table.samefile(roster):
-        raise InputError(f"{table} is the roster, so it is not replaced. Give another --table CSV.")
+        raise InputError(f"{table} is the roster, so it is not replaced. Choose another --table.")
     kept = [name for name in _COLUMNS[kind] if name in header]
     full = next((name for name in header if _is_column(name, column)), column)
     if full in kept:
         raise InputError(
-            f"{column} is a column that identifies students, so it cannot hold points. Give the "
+            f"{column} is a column that identifies students, so it cannot hold points. Pass the "
             f"name of the assignment: --column NAME."
         )
     files_of: dict[int, list[Submission]] = {}
@@ -162,7 +162,7 @@ def _read_roster(kind: str, path: Path) -> tuple[list[str], list[dict[str, str]]
             break
     else:
         raise InputError(
-            f"{path} has none of the columns {', '.join(_IDS[kind])}. Give the CSV file that "
+            f"{path} has none of the columns {', '.join(_IDS[kind])}. Pass the CSV file that "
             f"{kind.capitalize()} exports."
         )
     rows = [dict(zip(header, [*line, *[""] * len(header)], strict=False)) for line in lines if line]

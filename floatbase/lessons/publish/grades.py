@@ -361,7 +361,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]
         if path.is_file() and not _is_table(read_file(path), header):
             raise InputError(
                 f"{path} is not an unchanged table of an earlier grading with these columns, so it "
-                f"is not replaced. Give another file: --table CSV."
+                f"is not replaced. Choose another file: --table CSV."
             )
         write_whole(path, data, keep_link=True)
     except OSError as error:

@@ -127,7 +127,7 @@ def multiplier_labels(
     owners = {name.owner for name, _ in labels}
     if forces.stop - forces.start != contacts.k or not owners <= set(contacts.point_names):
         raise InputError(
-            "The solution is not for these contacts. Give contacts and solution of the same "
+            "The solution is not for these contacts. Pass contacts and solution of the same "
             "command."
         )
     picture: Picture = {}

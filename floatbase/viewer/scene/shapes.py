@@ -76,8 +76,7 @@ def _normal_path(path: str) -> str:
     normal = "/".join(f"{part}'" if part in _JAVASCRIPT_NAMES else part for part in parts if part)
     if not normal:
         raise InputError(
-            f"The path {path!r} in a picture has no name. Give it one, as in "
-            f"prefixed('name', items)."
+            f"The path {path!r} in a picture has no name. Add one, as in prefixed('name', items)."
         )
     return normal
 
