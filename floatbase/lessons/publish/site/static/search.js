@@ -14,7 +14,8 @@ if (typeof Search !== "undefined") {
   const LEAST = 0.5; // of the points of the best page, for a page to be listed
   const EXACT_TITLE = 10; // points; a title that contains the query has up to 16
 
-  const stems = (text) => new Set(splitQuery(text.toLowerCase())
+  const SPELLED = {τ: " tau ", μ: " mu ", λ: " lambda ", ᵀ: " t "};
+  const stems = (text) => new Set(splitQuery(text.toLowerCase().replace(/[τμλᵀ]/g, (c) => SPELLED[c]))
     .filter((word) => !stopwords.has(word)).map((word) => new Stemmer().stemWord(word)));
 
   // the site's spelling
@@ -26,8 +27,16 @@ if (typeof Search !== "undefined") {
   const pagesOf = (word) => pagesWith(new Set([word]), new Set());
   const weightOf = (pages) => Math.log(1 + Search._index.docnames.length / pages.length);
 
+  // different words of each page, as a fraction of the mean over all pages
+  const lengths = () => {
+    const {terms, docnames} = Search._index, counts = docnames.map(() => 0);
+    for (const pages of Object.values(terms)) for (const page of [pages].flat()) counts[page] += 1;
+    const mean = counts.reduce((sum, count) => sum + count, 0) / counts.length;
+    return new Map(docnames.map((name, page) => [name, counts[page] / mean]));
+  };
+
   Search.performTermsSearch = (words) => {
-    const weights = new Map(), found = new Map();
+    const weights = new Map(), found = new Map(), length = lengths();
     for (const word of words) {
       const pages = pagesOf(word);
       if (pages.length) weights.set(word, weightOf(pages));
@@ -47,7 +56,8 @@ if (typeof Search !== "undefined") {
           Object.assign(best, {heading: part, section: id && part > SECTION ? [title, id] : []});
       }
     }
-    const points = ({words, heading}) => POINTS * (words / all + heading);
+    const points = ({page, words, heading}) =>
+      POINTS * (words / all * Math.min(1, 3 / (2 + length.get(page[0]))) + heading);
     const most = Math.max(...[...found.values()].map(points));
     return [...found.values()].filter((each) => points(each) >= LEAST * most).map((each) => {
       const [docname, title, , , , file, kind] = each.page, [heading, id] = each.section;
@@ -64,31 +74,32 @@ if (typeof Search !== "undefined") {
     return score + (isExact ? EXACT_TITLE : 0);
   };
 
-  // sentences of a part of a page; a paragraph that is wholly in italics lists words to search for
-  const sentencesOf = (part, isWhole) =>
-    [...part.querySelectorAll("p, li:not(:has(p)), dd:not(:has(p))")]
-      .filter((paragraph) => isWhole || paragraph.closest("section, article") === part)
-      .filter((paragraph) => !paragraph.closest(OMITTED))
-      .filter((paragraph) => paragraph.querySelector("em")?.textContent !== paragraph.textContent)
-      .flatMap((paragraph) => paragraph.textContent.trim().split(/(?<=[.?!])\s+(?=\p{Lu})/u));
+  // whether a paragraph only lists links, or words to search for, which are in italics
+  const isList = (paragraph) => [...paragraph.querySelectorAll("a, em")]
+    .reduce((sum, one) => sum + one.textContent.length, 0) > paragraph.textContent.length / 2;
 
   Search.makeSearchSummary = (html, keywords, anchor) => {
     const page = new DOMParser().parseFromString(html, "text/html");
     const main = page.querySelector("article"); // without the buttons above it
     const place = page.getElementById(anchor?.slice(1) ?? "")?.closest("section, dl.py");
     const weights = [...keywords].map((word) => [word.toLowerCase(), weightOf(pagesOf(word))]);
-    const weigh = (text, without = "") => weights
-      .filter(([word]) => text.toLowerCase().includes(word) && !without.includes(word))
+    const weigh = (text, known = "") => weights
+      .filter(([word]) => text.toLowerCase().includes(word) && !known.toLowerCase().includes(word))
       .reduce((sum, [, weight]) => sum + weight, 0);
-    const parts = place ? [place] : [main, ...main.querySelectorAll("section")];
-    const most = (list, value) => list.reduce(
-      (best, each) => value(each) > value(best) ? each : best, list[0]);
+    const heaviest = (list, textOf, known) => list.reduce(
+      (best, one) => weigh(textOf(one), known) > weigh(textOf(best), known) ? one : best, list[0]);
     const headingOf = (part) =>
-      part.querySelector(":scope > :is(h1, h2, h3, h4)")?.firstChild?.textContent ?? "";
-    const part = most(parts, (each) => weigh(headingOf(each) + sentencesOf(each)));
-    const sentences = sentencesOf(part, place);
-    const heading = headingOf(part).toLowerCase();
-    const first = most(sentences, (sentence) => weigh(sentence, heading));
+      part.querySelector(":scope > :is(h2, h3, h4)")?.firstChild.textContent ?? "";
+    const paragraphsOf = (part) =>
+      [...part.querySelectorAll("p, li:not(:has(p)), dd:not(:has(p))")]
+        .filter((one) => part === place || one.closest("section, article") === part);
+
+    const part = place ?? heaviest([main, ...main.querySelectorAll("section")],
+      (one) => [headingOf(one), ...paragraphsOf(one).map((each) => each.textContent)].join(" "));
+    const heading = headingOf(part);
+    const sentences = paragraphsOf(part).filter((one) => !one.closest(OMITTED) && !isList(one))
+      .flatMap((one) => one.textContent.trim().split(/(?<=[.?!])\s+(?=\p{Lu})/u));
+    const first = heaviest(sentences, (sentence) => sentence, heading);
     let text = "";
     for (const sentence of sentences.slice(sentences.indexOf(first))) {
       if (text.length + sentence.length > LENGTH && text) break;
@@ -97,6 +108,12 @@ if (typeof Search !== "undefined") {
     const summary = document.createElement("p");
     summary.className = "context";
     summary.textContent = text;
+    // the result of a page leads to this section
+    if (!place && heading) queueMicrotask(() => {
+      const link = summary.parentElement?.querySelector("a");
+      link?.append(` > ${heading}`);
+      if (link) link.hash = part.id;
+    });
     return summary;
   };
 }
