@@ -166,7 +166,8 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
 # one page of each kind; the first two have a live robot in a frame
 KINDS = (
     "index.html", "live.html", "recall.html", "search.html", "lessons/06_friction_cones.html",
-    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "_static/lecture.html",
+    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "references.html",
+    "_static/lecture.html",
 )  # fmt: skip
 
 
