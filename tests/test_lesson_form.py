@@ -221,27 +221,22 @@ def test_each_picture_has_a_text_that_says_what_is_seen(path):
     assert short + marked + repeated == []
 
 
-def written(path):
-    """The text of a lesson or of another page."""
-    if path.suffix == ".md":
-        return path.read_text(encoding="utf-8")
-    return "\n\n".join(cell.source for cell in cells(path) if cell.cell_type == "markdown")
-
-
 def test_links_to_lessons_lead_to_headings_as_jupyterlab_names_them():
-    folders = NOTEBOOKS, NOTEBOOKS.parent / "docs", NOTEBOOKS.parent
-    pages = [page for folder in folders for page in [*folder.glob("*.md"), *folder.glob("*.ipynb")]]
-    links = {
-        (page.name, (page.parent / lesson).resolve(), unquote(heading))
-        for page in pages
-        for lesson, heading in re.findall(r"\]\(([^):]+\.ipynb)#([^)]+)\)", written(page))
-    }
-    headings = {
-        path: re.findall(r"^#+ (.+)$", written(path).replace("`", ""), re.MULTILINE)
+    pages = {
+        path: "\n".join(cell.source for cell in cells(path) if cell.cell_type == "markdown")
         for path in NOTEBOOKS.glob("*.ipynb")
     }
     places = {
-        (path, title.replace(" ", "-")) for path, titles in headings.items() for title in titles
+        (path.name, heading.replace(" ", "-"))
+        for path, text in pages.items()
+        for heading in re.findall(r"^#+ (.+)$", text.replace("`", ""), re.MULTILINE)
+    }
+    docs = [*NOTEBOOKS.glob("*.md"), *(NOTEBOOKS.parent / "docs").glob("*.md")]
+    pages |= {path: path.read_text(encoding="utf-8") for path in docs}
+    links = {
+        (path.name, lesson, unquote(heading))
+        for path, text in pages.items()
+        for lesson, heading in re.findall(r"\]\([^):]*?(\w+\.ipynb)#([^)]+)\)", text)
     }
     assert len(links) > 60
     assert [link for link in links if link[1:] not in places] == []
