@@ -1,8 +1,8 @@
-// Results of a search: each page that has words of the query, or its section whose heading has most
-// of them. A word that few pages have counts more. A result needs no word, since a question in one's
-// own words has words that the answer lacks.
+// Results of a search: each page with words of the query, or its section whose heading has most of
+// them. Words that few pages have count more. A result need not have all words, because a learner's
+// question has words that its answer lacks.
 // Excerpts: whole sentences of the section that has most words, without code, tables and lists of
-// contents.
+// contents. The result of a page leads to this section.
 
 if (typeof Search !== "undefined") {
   const LENGTH = 240; // characters of an excerpt, approximately
@@ -108,7 +108,6 @@ if (typeof Search !== "undefined") {
     const summary = document.createElement("p");
     summary.className = "context";
     summary.textContent = text;
-    // the result of a page leads to this section
     if (!place && heading) queueMicrotask(() => {
       const link = summary.parentElement?.querySelector("a");
       link?.append(` > ${heading}`);
