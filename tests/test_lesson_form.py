@@ -5,6 +5,7 @@ import re
 from collections import Counter
 from functools import cache
 from string import ascii_lowercase
+from urllib.parse import unquote
 
 import pytest
 
@@ -218,3 +219,24 @@ def test_each_picture_has_a_text_that_says_what_is_seen(path):
     marked = [texts[name] for name in pictures if re.search(r"[*$`\\]", texts[name])]
     repeated = [text for text, count in Counter(texts.values()).items() if text and count > 1]
     assert short + marked + repeated == []
+
+
+def test_links_to_lessons_lead_to_headings_as_jupyterlab_names_them():
+    pages = {
+        path: "\n".join(cell.source for cell in cells(path) if cell.cell_type == "markdown")
+        for path in NOTEBOOKS.glob("*.ipynb")
+    }
+    places = {
+        (path.name, heading.replace(" ", "-"))
+        for path, text in pages.items()
+        for heading in re.findall(r"^#+ (.+)$", text.replace("`", ""), re.MULTILINE)
+    }
+    docs = [*NOTEBOOKS.glob("*.md"), *(NOTEBOOKS.parent / "docs").glob("*.md")]
+    pages |= {path: path.read_text(encoding="utf-8") for path in docs}
+    links = {
+        (path.name, lesson, unquote(heading))
+        for path, text in pages.items()
+        for lesson, heading in re.findall(r"\]\([^):]*?(\w+\.ipynb)#([^)]+)\)", text)
+    }
+    assert len(links) > 60
+    assert [link for link in links if link[1:] not in places] == []

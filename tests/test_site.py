@@ -166,7 +166,8 @@ def test_pages_ask_nobody_for_anything_and_fit_a_phone(built, browser):
 # one page of each kind; the first two have a live robot in a frame
 KINDS = (
     "index.html", "live.html", "recall.html", "search.html", "lessons/06_friction_cones.html",
-    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "_static/lecture.html",
+    "lessons/equations.html", "api/floatbase.control.html", "teaching.html", "references.html",
+    "_static/lecture.html",
 )  # fmt: skip
 
 
@@ -207,6 +208,9 @@ SEARCHES = {
     "cite": "References",
     "push my robot": "Live robots",
     "how do I push my robot": "Push recovery and parameter sweeps",
+    "rnea returns 18 values but I have 12 motors": "Questions",
+    "osqp needs many iterations after a warm start": "Questions",
+    "center of pressure of each foot": "Questions",
 }
 
 
@@ -219,6 +223,11 @@ def test_excerpts_of_search_results_are_sentences(built, browser):
     whole = f"<main role=main><ul><li>A cone menu</ul><article>{found}</article></main>"
     summary = f"Search.makeSearchSummary(`{whole}`, ['cone'], '')"
     assert page.evaluate(f"{summary}.textContent") == "A cone opens. It has a tip."
+    with served(built) as address:  # a page from disk cannot fetch what it searches
+        page.goto(f"{address}/search.html?q=rnea+returns+18+values")
+        result = page.locator("#search-results li", has=page.locator(".context")).first
+        assert "#inverse-dynamics-gives-18" in (result.locator("a").get_attribute("href") or "")
+        assert "has no motor" in result.inner_text()
     page.close()
 
 

@@ -7,9 +7,11 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
+import nbformat
 import numpy as np
 import pytest
 from hints import LIFTED, ODD
+from nbformat.v4 import new_code_cell, new_notebook
 
 import floatbase as fb
 from floatbase.errors import InputError
@@ -319,3 +321,12 @@ def test_the_command_line_ends_with_a_message_and_no_traceback(learner, argument
         main(arguments)
     assert ended.value.code == 2
     assert (learner / "text").read_text() == "no notebook"
+
+
+def test_a_cell_that_takes_too_long_ends_the_command_with_its_source(learner, monkeypatch, capsys):
+    monkeypatch.setattr("floatbase.lessons.publish.notebooks.CELL_TIMEOUT", 1)
+    cells = [new_code_cell("import time; time.sleep(99)")]
+    nbformat.write(new_notebook(cells=cells), learner / "slow.ipynb")
+    with pytest.raises(SystemExit):
+        main(["run", "slow.ipynb"])
+    assert "time.sleep(99)" in capsys.readouterr().err

@@ -49,6 +49,8 @@ def main(
         )
     except shutil.Error as error:  # of the files of a folder
         parser.exit(2, f"The folder cannot be written: {error.args[0][0][2]}.\n")
+    except TimeoutError as error:  # of a cell
+        parser.exit(2, f"{error}\nOn a new machine, run `floatbase compile` first.\n")
     except OSError as error:  # the system names no file when a disk is full
         name = error.filename or "A file"
         parser.exit(2, f"{name} cannot be read or written: {error.strerror}.\n")

@@ -21,6 +21,7 @@ from floatbase.lessons.publish.workspace import (
     write_record,
 )
 
+CELL_TIMEOUT = 120  # s
 # nbformat and nbclient are imported where they are used: `make lab` needs neither
 
 
@@ -66,7 +67,7 @@ def execute_notebook(notebook: Any, folder: Path, **settings: str) -> Any:
     # its warning that this machine's loopback is not encrypted says nothing here
     quiet = ["--IPKernelApp.log_level=40"]
     where = {"metadata": {"path": str(folder)}}
-    client = NotebookClient(notebook, timeout=120, resources=where, extra_arguments=quiet)
+    client = NotebookClient(notebook, timeout=CELL_TIMEOUT, resources=where, extra_arguments=quiet)
     with tempfile.TemporaryDirectory(prefix="floatbase-") as home:
         client.execute(env={**os.environ, "FLOATBASE_HOME": home, **settings})
     for cell in notebook.cells:

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import re
 
+_SIDE_BAR = '<div id="pst-primary-sidebar"'
 _TOGGLE = '<summary><span class="toctree-toggle"'
-_NAMED_TOGGLE = _TOGGLE.replace(">", ' aria-label="pages of this part">', 1)
+_REPLACED = {
+    _SIDE_BAR: f'{_SIDE_BAR} role="navigation" aria-label="search and pages"',
+    _TOGGLE: _TOGGLE.replace(">", ' aria-label="pages of this part">', 1),
+    'role="doc-biblioentry"': 'role="listitem"',  # of a list
+}
 # its text is its name; a label would hide the keys that it shows
 _SEARCH_LABEL = re.compile(r'(<button class="btn search-button[^>]*) aria-label="Search"')
 # the parameters of a signature on several lines: definitions without terms
@@ -13,8 +18,10 @@ _PARAMETERS = re.compile(r"<dl>\n((?:<dd><em class=\"sig-param.*?</dd>\n)+)</dl>
 
 
 def accessible(page: str) -> str:
-    """Return a page whose controls have names, and whose definitions have terms."""
-    page = _SEARCH_LABEL.sub(r"\1", page.replace(_TOGGLE, _NAMED_TOGGLE))
+    """Return a page with names for controls, terms for definitions, and roles for parts."""
+    for theirs, ours in _REPLACED.items():
+        page = page.replace(theirs, ours)
+    page = _SEARCH_LABEL.sub(r"\1", page)
     return _PARAMETERS.sub(_as_lines, page)
 
 

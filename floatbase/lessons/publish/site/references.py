@@ -1,10 +1,14 @@
-"""Link equations (7), sections §4, App. C, notes and lessons in texts to their pages."""
+"""Link equations (7), sections §4, App. C, notes and lessons in texts to their pages.
+
+A text links a section of a lesson as JupyterLab and nbconvert do: `05_….ipynb#The-heading`.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from urllib.parse import unquote
 
 from floatbase.lessons.publish.formulas import FORMULAS, SECTIONS
 
@@ -20,7 +24,9 @@ REFERENCE = re.compile(
     r"[ABC])\b"
     r"|(?P<note>\bnotes? \d+)|(?P<lesson>\b[Ll]esson (?:\d\d|[A-Z])\b)"
 )
-_LESSON_LINK = re.compile(r"\[([^\]]*)\]\((?:lessons/)?([^:()/]+\.ipynb)\)")
+_LESSON_LINK = re.compile(
+    r"\[(?P<text>[^\]]*)\]\((?P<page>[^:()#]+\.ipynb)(?:#(?P<heading>[^()]+))?\)"
+)
 _IN_MARKDOWN = re.compile(f"(?P<kept>{_NOT_LINKED})|{REFERENCE.pattern}", re.DOTALL | re.MULTILINE)
 
 
@@ -55,7 +61,7 @@ def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
     def link(match: re.Match[str]) -> str:
         if match["kept"]:
             to_lesson = _LESSON_LINK.fullmatch(match[0])
-            return to_lesson[1] if to_lesson and to_lesson[2] not in names else match[0]
+            return _site_link(to_lesson, names) if to_lesson else match[0]
         address = (
             lessons.get(match["lesson"].split()[1], "")
             if match["lesson"]
@@ -64,3 +70,11 @@ def add_links(markdown: str, lessons: Mapping[str, str]) -> str:
         return f"[{match[0]}]({address})" if len(address) > 1 else match[0]
 
     return _IN_MARKDOWN.sub(link, markdown)
+
+
+def _site_link(link: re.Match[str], names: set[str]) -> str:
+    """Return a link to a lesson with the anchor that MyST gives its heading."""
+    if Path(link["page"]).name not in names:
+        return link["text"]
+    anchor = re.sub(r"[^\w-]", "", unquote(link["heading"] or "").lower())
+    return f"[{link['text']}]({link['page']}{anchor and '#'}{anchor})"
