@@ -181,11 +181,11 @@ EXERCISES = (
             "The axes agree only as long as the robot faces forwards.",
             refuted={
                 "sign": "A wrong sign would have the same effect at every heading. At 0° the "
-                "result is right, at 90° it is wrong.",
+                "result is right, but at 90° it is wrong.",
                 "transpose": "Rᵀ does take a vector from world axes to base axes. Does everything "
                 "in the residual go there?",
                 "missing term": "A missing term would have the same effect at every heading. At 0° "
-                "the result is right, at 90° it is wrong.",
+                "the result is right, but at 90° it is wrong.",
             },
             elsewhere="At 0° the result is right, at 90° it is turned by 90°. Which line depends "
             "on the heading?",
