@@ -187,8 +187,8 @@ EXERCISES = (
                 "missing term": "A missing term would have the same effect at every heading. At 0° "
                 "the result is right, but at 90° it is wrong.",
             },
-            elsewhere="At 0° the result is right, at 90° it is turned by 90°. Which line depends "
-            "on the heading?",
+            elsewhere="At 0° the result is right, and at 90° it is turned by 90°. Which line "
+            "depends on the heading?",
         ),
         explanation="Line 2 turns the Jacobian into base axes, and line 3 leaves the goal and the "
         "drift in world axes. Turn both or neither.",
