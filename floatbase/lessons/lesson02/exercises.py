@@ -96,7 +96,7 @@ def _judge_fault(answer: Any) -> Verdict:
         ("line_3", line == 3, "A wrong state would give a wrong J, so the contact forces would "
          "have wrong moments. The moment rows are almost zero."),
         ("line_4", line == 4, "A wrong sign of the forces would show in the vertical row, and a "
-         "wrong place in the moment rows. Both are almost zero, at all times."),
+         "wrong place in the moment rows. Both are almost zero at all four times."),
     ]) or ERROR_JUDGE(given[1:])  # fmt: skip
 
 

@@ -181,14 +181,14 @@ EXERCISES = (
             "The axes agree only as long as the robot faces forwards.",
             refuted={
                 "sign": "A wrong sign would have the same effect at every heading. At 0° the "
-                "result is right, at 90° it is wrong.",
+                "result is right, but at 90° it is wrong.",
                 "transpose": "Rᵀ does take a vector from world axes to base axes. Does everything "
                 "in the residual go there?",
                 "missing term": "A missing term would have the same effect at every heading. At 0° "
-                "the result is right, at 90° it is wrong.",
+                "the result is right, but at 90° it is wrong.",
             },
-            elsewhere="At 0° the result is right, at 90° it is turned by 90°. Which line depends "
-            "on the heading?",
+            elsewhere="At 0° the result is right, and at 90° it is turned by 90°. Which line "
+            "depends on the heading?",
         ),
         explanation="Line 2 turns the Jacobian into base axes, and line 3 leaves the goal and the "
         "drift in world axes. Turn both or neither.",
