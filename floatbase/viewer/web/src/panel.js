@@ -6,6 +6,8 @@ import {element, make} from "./dom.js";
 import {createPlot} from "./plot.js";
 
 const COLUMNS = ["", "model", "reality"];
+const WHOLE_EQUATION = "Left: inertia and weight. Right: motors and forces at the feet. " +
+  "Press a term.";
 const COPIED_FOR = 2000; // ms
 
 // send(message): sends a message to the window.
@@ -124,7 +126,7 @@ export function createPanel(send) {
   }
 
   // what the term under the pointer means, for those who see no titles: on a phone, or in a lecture
-  const explanation = make("p", {ariaHidden: true});
+  const explanation = make("p", {ariaHidden: true, textContent: WHOLE_EQUATION});
 
   // A term of an equation, above the picture: its symbol shows its arrows, the two boxes switch it
   // off in the controller's model and in the simulated world.
@@ -154,10 +156,17 @@ export function createPanel(send) {
     made.setAttribute("aria-label", label); // with the text that the button shows
     made.setAttribute("aria-disabled", disabled); // it keeps its title and the keyboard's focus
     show(value);
-    const explain = () => { explanation.textContent = label; };
+    const explain = () => {
+      const state = part === "shown" ? "" : value ? ": on" : ": off";
+      explanation.textContent = label + state;
+    };
     made.onclick = () => {
-      explain();
       if (!disabled) setValue(!value);
+      explain();
+    };
+    made.onblur = () => { explanation.textContent = WHOLE_EQUATION; };
+    made.onpointerleave = ({pointerType}) => { // a finger leaves after each tap
+      if (pointerType === "mouse") made.onblur();
     };
     made.onpointerenter = made.onfocus = explain;
     cell.append(made);

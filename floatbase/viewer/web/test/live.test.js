@@ -118,13 +118,13 @@ test("the sentence names what limits the robot, the most important first", () =>
   assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
   assert.match(text({outcome: "fell"}), /^The robot fell/);
   const reason = limitOf(frameWith({outcome: "fell"}), robot, "It slipped.").text;
-  assert.match(reason, /fell.*\nJust before: It slipped\.$/);
+  assert.match(reason, /fell.* Just before: It slipped\.$/);
   assert.doesNotMatch(text({height: 0.6}), /stands/); // it lies on its legs
   assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
   const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
     ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
   assert.match(text({outcome: "infeasible", conflict}),
-    /friction of the front left foot, torque limit of the rear left calf joint and 1 more\./);
+    /friction of the front left foot, torque limit of the rear left calf joint and 1 more /);
   assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
 });
 
@@ -140,13 +140,15 @@ test("the label of a map has few settings", () => {
     "trot, 0.3 m/s, facets 8 and 2 more");
 });
 
-test("a sentence stays long enough to be read, and a more important one waits for its turn", () => {
+test("a sentence stays long enough to be read, unless a more important one follows", () => {
   const said = [], tell = createVoice((text) => said.push(text), 600);
   tell({rank: 6, text: "nothing"}, 0);
   tell({rank: 3, text: "friction"}, 100);
   tell({rank: 6, text: "nothing"}, 500);
-  tell({rank: 6, text: "nothing"}, 700);
   assert.deepEqual(said, ["nothing", "friction"]);
+  tell({rank: 5, text: "unloaded"}, 600);
+  tell({rank: 6, text: "nothing"}, 700);
+  assert.deepEqual(said.splice(2), ["unloaded"]); // the most important one of those that waited
   tell({rank: -2, text: "refused", stays: 5000}, 1400);
   tell({rank: 0, text: "fell"}, 6300);
   tell({rank: 6, text: "nothing"}, 6500);

@@ -38,7 +38,7 @@ export function footText(facets, planned, worth, least) {
       `wants. Now it is off by ${worth.now.toFixed(1)} m/s².`
     : "would hardly change the body's acceleration.";
   return `At the edge (facet ${facet + 1}). 1 N more friction here ${motion} It would lower the ` +
-    `cost by ${worth.cost.toPrecision(2)}.`;
+    `controller's cost, the sum of all missed goals, by ${Number(worth.cost.toPrecision(2))}.`;
 }
 
 // choose(name): called with the contact point that is watched, or null.

@@ -49,7 +49,8 @@ const ownerOf = ([kind, owner]) => (kind.includes("joint") || kind.includes("tor
 function conflictText(conflict) {
   const all = conflict.map((one) => (
     `${one[0].replace(/^(upper|lower) /, "")} of the ${ownerOf(one)}`));
-  return `These constraints cannot hold together: ${list([...new Set(all)], MOST_CONFLICTS)}. ` +
+  return "Feet and motors cannot keep all limits at once: " +
+    `${list([...new Set(all)], MOST_CONFLICTS)} conflict. ` +
     "The robot will be back on its feet in a moment.";
 }
 
@@ -71,7 +72,7 @@ export function limitOf(frame, robot, before = "") {
   if (frame.outcome) {
     const slipped = frame.hasSlipped ? "The feet slipped. " : "";
     const text = frame.conflict.length ? conflictText(frame.conflict) : STOPPED[frame.outcome];
-    const reason = slipped || frame.conflict.length || !before ? "" : `\nJust before: ${before}`;
+    const reason = slipped || frame.conflict.length || !before ? "" : ` Just before: ${before}`;
     return {rank: 0, text: slipped + (text ?? frame.outcome) + reason};
   }
   if (isInAir(frame, robot)) return {rank: IN_AIR, text: table.air};
@@ -97,14 +98,15 @@ export function limitOf(frame, robot, before = "") {
 
 export const isLimit = ({rank}) => rank > IN_AIR && rank < CALM;
 
-// Sentences that stay long enough to be read, `stays` ms. Of those in the meantime, the most
-// important one is said.
+// Sentences that stay long enough to be read, `stays` ms, unless a more important one follows. Of
+// those in the meantime, the most important one is said.
 export function createVoice(say, period = 600) {
-  let best = null, next = 0;
+  let best = null, next = 0, said = Infinity; // said: the rank
   return ({rank, text, stays = period}, now) => {
     if (best === null || rank < best.rank) best = {rank, text, stays};
-    if (now < next) return;
+    if (now < next && best.rank >= said) return;
     say(best.text);
+    said = best.rank;
     next = now + best.stays;
     best = null;
   };
