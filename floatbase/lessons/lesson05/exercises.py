@@ -148,9 +148,7 @@ def judge_wrench(answer: Any) -> Verdict:
         verdict = judge(part)
         if not verdict.right:
             return replace(verdict, text=f"{name}: {verdict.text}")
-    return Verdict(
-        True, "Newton's law for the force, Euler's for the moment: what the controller below wants."
-    )
+    return Verdict(True, "This is Newton's law for the force and Euler's law for the moment.")
 
 
 def wrench_examples() -> list[Example]:
