@@ -43,7 +43,7 @@ LIMITED = {"tsid limits": np.inf, "tsid tight limits": 20.0}
 
 
 @dataclass(frozen=True)
-class Regularisation:
+class Regularization:
     """Weights of ‖λ‖² and ‖τ‖² in the peer, and in floatbase for the same optimum."""
 
     peer_force: float
@@ -54,10 +54,10 @@ class Regularisation:
 
 
 REGULARISATION = {
-    ("tsid", "points"): Regularisation(1e-5, 0.0, HESSIAN, 1e-5 + HESSIAN, 0.0),
-    ("tsid", "flat"): Regularisation(0.0, 0.0, HESSIAN, HESSIAN, 0.0),
-    ("placo", "points"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
-    ("placo", "flat"): Regularisation(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
+    ("tsid", "points"): Regularization(1e-5, 0.0, HESSIAN, 1e-5 + HESSIAN, 0.0),
+    ("tsid", "flat"): Regularization(0.0, 0.0, HESSIAN, HESSIAN, 0.0),
+    ("placo", "points"): Regularization(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
+    ("placo", "flat"): Regularization(1e-5, 1e-5, HESSIAN, 1e-5 + HESSIAN, 1e-5),
 }
 
 
@@ -74,7 +74,7 @@ class Problem:
         return all(foot.is_flat for foot in self.robot.feet)
 
     @property
-    def regularisation(self) -> Regularisation:
+    def regularization(self) -> Regularization:
         """Weights of forces and torques."""
         peer = "tsid" if self.peer in LIMITED else self.peer
         return REGULARISATION[peer, "flat" if self.is_flat else "points"]
@@ -87,7 +87,7 @@ class Problem:
     @property
     def tasks(self) -> tuple[Any, ...]:
         """Standing, and what regularises."""
-        weights, at = self.regularisation, self.robot.standing()
+        weights, at = self.regularization, self.robot.standing()
         return (
             *fb.standing_tasks(at)[:2],
             fb.PostureTask(at.q, weight=POSTURE),
@@ -146,9 +146,9 @@ class Problem:
             "com": _told(com, com.position),
             "orientation": _told(base, base.rotation),
             "posture": _told(posture, np.asarray(posture.q)[7:]),
-            "force_weight": self.regularisation.peer_force,
-            "hessian": self.regularisation.hessian,
-            "torque_weight": self.regularisation.peer_torque,
+            "force_weight": self.regularization.peer_force,
+            "hessian": self.regularization.hessian,
+            "torque_weight": self.regularization.peer_torque,
             "contacts": [
                 {"frame": foot.frame, "corners": _plain(foot.corners), "mu": MU}
                 for foot in robot.feet

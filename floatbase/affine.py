@@ -284,7 +284,7 @@ class Quadratic(Value):
     >>> cost = fb.Quadratic.from_residual(np.eye(2), [1.0, 2.0])
     >>> cost([1.0, 2.0])
     0.0
-    >>> cost.minimiser()
+    >>> cost.minimizer()
     array([1., 2.])
     """
 
@@ -394,7 +394,7 @@ class Quadratic(Value):
             )
         return Quadratic(f.A.T @ self.H @ f.A, f.A.T @ (self.H @ f.b + self.g), self(f.b))
 
-    def minimiser(self) -> Array:
+    def minimizer(self) -> Array:
         """Compute the point of least cost that has the smallest norm.
 
         Returns

@@ -112,7 +112,7 @@ def test_the_gradient_is_the_slope_of_the_cost(seed, n):
 def test_no_point_costs_less_than_the_minimizer(seed, n):
     rng = np.random.default_rng(seed)
     cost = quadratic(rng, n)
-    best = cost.minimiser()
+    best = cost.minimizer()
     assert np.allclose(cost.gradient(best), 0.0, atol=1e-8)
     assert all(cost(best + rng.normal(size=n)) > cost(best) for _ in range(10))
 
@@ -122,7 +122,7 @@ def test_among_many_minimizers_the_smallest_is_given(seed, m, n):
     rng = np.random.default_rng(seed)
     A, r = rng.normal(size=(m, n)), rng.normal(size=m)
     expected = np.linalg.lstsq(A, r)[0]
-    assert np.allclose(fb.Quadratic.from_residual(A, r).minimiser(), expected, atol=1e-6)
+    assert np.allclose(fb.Quadratic.from_residual(A, r).minimizer(), expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(("curvature", "counts"), [(1e-10, True), (1e-13, False)])
@@ -132,7 +132,7 @@ def test_what_counts_as_curvature_is_decided_in_one_place(curvature, counts):
     """
     cost = fb.Quadratic(np.diag([1.0, curvature]), np.array([0.0, -curvature]))
     over = cost.argmin_over(np.array([[0.0], [1.0]]))
-    assert np.allclose(cost.minimiser(), [0.0, float(counts)])
+    assert np.allclose(cost.minimizer(), [0.0, float(counts)])
     assert np.allclose(cost.argmin_over(np.eye(2))([3.0, 4.0]), [0.0, 1.0 if counts else 4.0])
     # on its own, this curvature is the largest one
     assert np.allclose(over([3.0, 4.0]), [3.0, 1.0])
@@ -182,10 +182,10 @@ def test_sums_and_products_that_mean_nothing_are_refused(make, named):
 
 def test_a_cost_that_falls_for_ever_has_no_minimum():
     flat = fb.Quadratic(np.diag([1.0, 0.0]), np.array([1.0, 0.5]))
-    refused(flat.minimiser, InputError)
+    refused(flat.minimizer, InputError)
     saddle = fb.Quadratic(np.diag([1.0, -1.0]), np.zeros(2))
-    refused(saddle.minimiser, InputError, -1)
-    assert np.array_equal(fb.Quadratic.zero(2).minimiser(), [0.0, 0.0])
+    refused(saddle.minimizer, InputError, -1)
+    assert np.array_equal(fb.Quadratic.zero(2).minimizer(), [0.0, 0.0])
 
 
 def test_the_matrix_of_a_cost_is_made_symmetric_without_changing_the_cost():

@@ -217,7 +217,7 @@ class MPC(Walk):
         base = R.ravel(), turning + alpha * s, alpha
         targets[entries["orientation of base"]] = np.concatenate(base)
         stands = [name in active.plan.stance for name in self._all_contacts.names]
-        targets[entries["force regularisation"]] = motion.forces[0, stands].ravel()
+        targets[entries["force regularization"]] = motion.forces[0, stands].ravel()
 
     def _solve(self, state: State, t: float, active: ActivePlan) -> None:
         """Solve the horizon from a measured state at t [s]."""

@@ -202,5 +202,5 @@ class AnalyticController(Value):
         v = as_array("v", v, (self.robot.nv,))  # State takes None for rest; here it is a mistake
         eom = equations_of_motion(State(self.robot, q, v), self.contacts, t)
         space = feasible_space(eom)
-        qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimiser())
+        qdd, tau, forces = space(cost_on_space(space, *self.objective(eom)).minimizer())
         return AnalyticCommand(read_only(tau), read_only(forces), read_only(qdd))

@@ -110,7 +110,7 @@ class Problem(Value):
         super().__post_init__()
         if self.modify_qp is not None:
             as_callable("modify_qp", self.modify_qp, "modify_qp(qp, eom)")
-        tasks, sizes = _with_regularisation(self.robot, self.tasks)
+        tasks, sizes = _with_regularization(self.robot, self.tasks)
         if not isinstance(self.level_sizes, list | tuple):
             raise InputError(
                 f"level_sizes must be a list of integers, not {short_repr(self.level_sizes)}."
@@ -431,7 +431,7 @@ def _standing_equations(robot: Robot, contacts: Contacts) -> EquationsOfMotion:
     return equations_of_motion(robot.standing(), contacts)
 
 
-def _with_regularisation(robot: Robot, tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
+def _with_regularization(robot: Robot, tasks: Sequence[Task]) -> tuple[tuple[Task, ...], list[int]]:
     """Return the tasks with small regularization tasks where they are missing, and level sizes.
 
     A `ForceTask` or `TorqueTask` is added if no task determines the forces, or none the torques.

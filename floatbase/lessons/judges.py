@@ -57,7 +57,7 @@ def stopped(error: Exception) -> Verdict:
     return Verdict(False, f"Your function stops with {type(error).__name__}: {error}", "stops")
 
 
-def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
+def minimizer_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Array | Verdict:
     """Return the minimizer of a learner's cost, or a verdict on what is wrong with the cost."""
     if answer is None or answer is Ellipsis:
         return NO_ANSWER
@@ -76,7 +76,7 @@ def minimiser_or_verdict(answer: Any, n: int, block: str, hint: str = "") -> Arr
             "other_block",
         )
     try:
-        return answer.minimiser()
+        return answer.minimizer()
     except FloatbaseError as error:
         return Verdict(False, f"The cost has no minimum: {error}", "no_least_point")
 

@@ -37,7 +37,7 @@ from floatbase.objectives.pullback import (
     minimum_norm_pullback,
     partial_minimum,
 )
-from floatbase.objectives.regularisation import ForceTask, TorqueTask, effort_weight
+from floatbase.objectives.regularization import ForceTask, TorqueTask, effort_weight
 from floatbase.objectives.relative_pose import RelativePoseTask
 
 # fmt: off

@@ -18,7 +18,7 @@ from floatbase.control import JointLimits
 from floatbase.dynamics import fixed_frame, moving_frame
 from floatbase.errors import InfeasibleError, SolverError, UnknownNameError
 
-# of the weight, N or N·m: the torque regularisation lets a robot begin to sag; 1.5e-3 on
+# of the weight, N or N·m: the torque regularization lets a robot begin to sag; 1.5e-3 on
 # anymal_kinova
 SAG = 2e-3
 # of the friction coefficient 0.3: a force at its limit may deviate slightly from the desired one
@@ -203,7 +203,7 @@ def test_torque_limits_are_the_robots_or_those_given_or_none():
     assert names == [f"torque limit {robot.joint_names[3]} {side}" for side in ("upper", "lower")]
 
 
-def test_regularisation_is_added_where_it_is_missing_and_shown(go2):
+def test_regularization_is_added_where_it_is_missing_and_shown(go2):
     contacts, tasks = fb.Contacts.points(go2), fb.standing_tasks(go2.standing())
     added = fb.WholeBodyController(go2, contacts, tasks).tasks[len(tasks) :]
     assert {type(task) for task in added} == {fb.ForceTask, fb.TorqueTask}

@@ -96,5 +96,5 @@ def test_a_wrong_count_is_told_to_say_what_it_counts():
 
 def test_a_cost_is_told_from_what_is_none():
     cost = next(answer for answer, hint in examples("04.3") if not hint)
-    assert EXERCISES["04.3"].judge(cost.minimiser()).hint == "no_cost"
+    assert EXERCISES["04.3"].judge(cost.minimizer()).hint == "no_cost"
     assert EXERCISES["04.3"].judge(-1.0 * cost).hint == "no_least_point"

@@ -26,7 +26,7 @@ def test_exercise_05_1_has_the_wrench_of_the_controller():
     now, goal = moving_and_goal_state()
     controller = AnalyticController(GO2, EOM.contacts, goal, bias_weight=1e-12)
     cost = controller.objective(fb.equations_of_motion(now, EOM.contacts))[2]
-    wrench = com_wrench_map(now, EOM.contacts)(cost.minimiser())
+    wrench = com_wrench_map(now, EOM.contacts)(cost.minimizer())
     assert right("05.1", lambda *_: np.split(wrench, 2))
 
 

@@ -40,7 +40,7 @@ def mpc(gait, velocity, **options):
 
 @pytest.mark.front_end
 @pytest.mark.parametrize(("n", "bounce"), [(1, False), (1, True), (3, False), (10, False)])
-def test_a_long_flight_needs_a_horizon(n, bounce):
+def test_a_long_flight_after_a_quick_start_needs_a_horizon(n, bounce):
     gait = Gait.flying_trot(judges.load("go2"), stance=0.1, flight=0.12, start=0.2)
     run = run_go2(mpc(gait, 1.0, n=n, bounce=bounce), 2.6)
     assert run.outcome == ("fell" if n == 1 else "completed")

@@ -137,7 +137,7 @@ def test_at_the_minimum_of_the_wrench_objective_the_robot_moves_as_desired(robot
         a, spin = rng.normal(size=3), rng.normal(size=3)
         desired = objectives.desired_wrench(state, a, spin)
         cost = objectives.wrench_objective(state, contacts, *desired)
-        forces = cost.minimiser()
+        forces = cost.minimizer()
         assert cost(forces) < 1e-12 * state.robot.weight**2
         rate = mujocos_momentum_rate(state, contacts, forces, np.zeros(state.robot.d))[0]
         assert np.allclose(rate[:3] / state.robot.mass, a, atol=1e-4)
@@ -159,7 +159,7 @@ def test_the_wrench_objective_has_the_value_of_its_formula(standing):
         direct = 0.25 * np.sum((force - f.sum(axis=0)) ** 2)
         direct += 1.5 * np.sum((moment - np.cross(points - standing.com, f).sum(axis=0)) ** 2)
         assert cost(lam) == pytest.approx(direct, rel=1e-10)
-        assert (cost(cost.minimiser()) > 1e-3) == (feet < 3)
+        assert (cost(cost.minimizer()) > 1e-3) == (feet < 3)
 
 
 # (23) ---------------------------------------------------------------------------------------------

@@ -84,7 +84,7 @@ def test_a_cost_pulled_back_to_the_torques_has_the_least_value_over_everything(n
     eom = judges.at_rest(name)
     residuals = {"qdd": costs(eom)["qdd"]}
     seen = as_quadratics(residuals)["qdd"].pullback(fb.accelerations_from_torques(eom))
-    assert seen(seen.minimiser()) == pytest.approx(least(eom, residuals), rel=1e-6)
+    assert seen(seen.minimizer()) == pytest.approx(least(eom, residuals), rel=1e-6)
 
 
 @pytest.mark.parametrize("name", judges.FLOATING)
@@ -95,7 +95,7 @@ def test_costs_on_all_three_pulled_back_to_beta_have_their_least_value_over_ever
     residuals = costs(eom)
     space = dynamics.feasible_space(eom)
     seen = objectives.cost_on_space(space, **as_quadratics(residuals))
-    beta = seen.minimiser()
+    beta = seen.minimizer()
     assert seen(beta) == pytest.approx(least(eom, residuals), rel=1e-6)
     parts = zip(as_quadratics(residuals).values(), space(beta), strict=True)
     assert sum(cost(x) for cost, x in parts) == pytest.approx(seen(beta), rel=1e-9)
@@ -166,7 +166,7 @@ def test_accelerations_that_cannot_change_do_not_determine_beta(go2):
     assert np.max(np.abs(objectives.minimum_norm_coordinates(space, "qdd").A)) < 1e6
     cost = objectives.cost_on_space(space, tau=fb.Quadratic.from_residual(np.eye(12), np.zeros(12)))
     found = objectives.partial_minimum(cost, space, "qdd")(np.zeros(18))
-    assert found == pytest.approx(cost(cost.minimiser()), abs=1e-6)  # q̈ leaves everything free
+    assert found == pytest.approx(cost(cost.minimizer()), abs=1e-6)  # q̈ leaves everything free
 
 
 def test_a_cost_that_falls_for_ever_over_what_the_block_leaves_free_is_refused():

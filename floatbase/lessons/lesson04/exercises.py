@@ -18,7 +18,7 @@ from floatbase.lessons.judges import (
     array_or_verdict,
     first_fault,
     function_or_verdict,
-    minimiser_or_verdict,
+    minimizer_or_verdict,
     stopped,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom
@@ -120,7 +120,7 @@ def _lesson_costs() -> dict[str, Any]:
 def _judge_design(answer: Any) -> Verdict:
     """Judge a cost on torques by what its minimum does."""
     eom = standing_go2_eom()
-    tau = minimiser_or_verdict(answer, eom.d, "τ", "Pull it back through η.")
+    tau = minimizer_or_verdict(answer, eom.d, "τ", "Pull it back through η.")
     if isinstance(tau, Verdict):
         return tau
     eta, zeta = fb.accelerations_from_torques(eom), fb.forces_from_torques(eom)

@@ -29,7 +29,7 @@ class MinimumCostController:
     def __call__(self, q: Array, v: Array, t: float) -> TorqueCommand:
         """Return the torques for configuration q and velocity v."""
         eom = fb.equations_of_motion(fb.State(self.robot, q, v), self.contacts)
-        return TorqueCommand(self.cost(eom).minimiser())
+        return TorqueCommand(self.cost(eom).minimizer())
 
 
 def measured_acceleration(record: Rollout) -> Array:

@@ -49,7 +49,7 @@ def cost_slices(**costs: tuple[fb.Quadratic, str, str, float]) -> Figure:
         flat, curved = np.linalg.eigvalsh(cost.H)
         if flat > VALLEY_RATIO * curved:
             style = {"color": hex_code(GREYS[0]), "markeredgecolor": "white"}
-            ax.plot(*cost.minimiser(), "o", markersize=8, **style)
+            ax.plot(*cost.minimizer(), "o", markersize=8, **style)
         ax.set(xlabel=x_name, ylabel=y_name, title=title.replace("_", " "), aspect="equal")
     plt.close(figure)
     return figure

@@ -21,7 +21,7 @@ from floatbase.lessons.judges import (
     Verdict,
     first_fault,
     function_or_verdict,
-    minimiser_or_verdict,
+    minimizer_or_verdict,
     stopped,
 )
 from floatbase.lessons.lesson03 import standing_go2_eom, standing_still_beta
@@ -244,7 +244,7 @@ def judge_design(answer: Any) -> Verdict:
             cost = program(_goal(name))
         except Exception as error:  # whatever a learner's function raises
             return stopped(error)
-        forces = minimiser_or_verdict(cost, eom.k, "λ")
+        forces = minimizer_or_verdict(cost, eom.k, "λ")
         if isinstance(forces, Verdict):
             return replace(forces, text=f"With {name}: {forces.text}")
         if wrong := _wrong_forces(eom, forces, _goal(name)):
@@ -318,9 +318,9 @@ def design_examples() -> list[Example]:
     eom = standing_go2_eom()
     share, forwards = eom.robot.weight / 4, _goal("60 N forwards")
     zeta, right = fb.forces_from_torques(eom), inclined_design()
-    pasted = fb.Quadratic.from_residual(np.eye(12), right(forwards).minimiser())
+    pasted = fb.Quadratic.from_residual(np.eye(12), right(forwards).minimizer())
     diagonal = squeeze_forces(eom.contacts)["diagonal"]
-    smallest = _goal_cost(forwards).minimiser()
+    smallest = _goal_cost(forwards).minimizer()
     pulling = fb.Quadratic.from_residual(np.eye(12), smallest + 25.0 * diagonal)
 
     def biased(weight: float, alpha: float = 0.1) -> Callable[[Array], fb.Quadratic]:

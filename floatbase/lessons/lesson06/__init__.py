@@ -4,7 +4,7 @@ from floatbase.lessons.lesson06.helpers import (
     ConeController,
     accelerate,
     com_beside_feet,
-    constrained_minimiser,
+    constrained_minimizer,
     make_controller,
     state_with_feet_at,
 )

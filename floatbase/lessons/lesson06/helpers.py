@@ -74,7 +74,7 @@ class ConeController:
             wrench_objective(eom.state, self.contacts, *wish, moment_weight=self.moment_weight)
             + self._bias
         )
-        forces = constrained_minimiser(cost, self._rows)
+        forces = constrained_minimizer(cost, self._rows)
         return TorqueCommand(torques_from_forces(eom).torque(forces), forces)
 
     def wrench_goal(self, now: fb.State) -> tuple[Array, Array]:
@@ -85,8 +85,8 @@ class ConeController:
         return desired_wrench(now, a, centroidal_inertia(now) @ turn)
 
 
-def constrained_minimiser(cost: fb.Quadratic, G: npt.ArrayLike, h: npt.ArrayLike = 0.0) -> Array:
-    """Minimise a cost subject to G x ≤ h.
+def constrained_minimizer(cost: fb.Quadratic, G: npt.ArrayLike, h: npt.ArrayLike = 0.0) -> Array:
+    """Minimize a cost subject to G x ≤ h.
 
     Parameters
     ----------

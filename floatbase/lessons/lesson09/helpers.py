@@ -16,7 +16,7 @@ from floatbase.behaviours import Gait, Stand, Swing
 from floatbase.dynamics import grasp_matrix
 from floatbase.errors import SimulationWarning
 from floatbase.friction import FrictionPolyhedron
-from floatbase.lessons.lesson06 import constrained_minimiser
+from floatbase.lessons.lesson06 import constrained_minimizer
 from floatbase.simulation import Rollout
 
 MU = 0.7
@@ -136,7 +136,7 @@ def corner_forces(
     # 1 N·m counts as 10 N, its force at the corners, 10 cm away
     weights = np.repeat([1.0, 10.0], 3)
     cost = fb.Quadratic.from_residual(weights[:, None] * G, weights * np.asarray(wrench))
-    return constrained_minimiser(
+    return constrained_minimizer(
         cost + _FORCE_WEIGHT * fb.Quadratic.from_residual(np.eye(sole.k), np.zeros(sole.k)), rows
     )
 

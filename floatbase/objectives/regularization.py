@@ -1,4 +1,4 @@
-"""Regularisation tasks, which keep contact forces and joint torques near a target."""
+"""Regularization tasks, which keep contact forces and joint torques near a target."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class ForceTask(_BlockTask):
         Name in messages and tables.
     """
 
-    name: str = "force regularisation"
+    name: str = "force regularization"
     block: ClassVar[Block] = "forces"
     target_shapes: ClassVar[Shapes] = {"target": ("k",)}
     compiled_as = "force"
@@ -92,7 +92,7 @@ class TorqueTask(_BlockTask):
         Name in messages and tables.
     """
 
-    name: str = "torque regularisation"
+    name: str = "torque regularization"
     block: ClassVar[Block] = "tau"
     target_shapes: ClassVar[Shapes] = {"target": ("d",)}
     compiled_as = "torque"
