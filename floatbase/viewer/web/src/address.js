@@ -9,7 +9,9 @@ const MOST = 1e4; // of a number of such a key
 const MOST_SHOWN = 40; // characters of a text in a message
 const SWITCHES = new Map([["on", true], ["off", false]]);
 
-export const isKept = (command) => !command.is_hidden && kindOf(command) !== "button";
+// A control that opens another page would open it again when the reader goes back.
+export const isKept = (command) => (
+  !command.is_hidden && !command.opens_page && kindOf(command) !== "button");
 
 // The value of a control as a text, and back; undefined for a text that is no value.
 export function textOf({choices}, value) {

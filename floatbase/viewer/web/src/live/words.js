@@ -4,8 +4,8 @@ import {isInAir} from "../engine/contacts.js";
 import table from "../../../../live/limits.json" with {type: "json"};
 
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
-const MOST_CONFLICTS = 2; // in a sentence
 const IN_AIR = 1; // rank of the sentence about flight, which is no limit
+const REASON_TIME = 1; // s before a fall in which a limit may be its reason
 const CALM = table.limits.length + 2; // rank of a sentence that names no limit
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
@@ -29,9 +29,9 @@ export function jointName(name) {
     : name.replaceAll("_", " ");
 }
 
-// "A", "A and B", "A, B and 3 more": at most `most` names.
-function list(names, most = table.most_names) {
-  const more = names.length - most;
+// "A", "A and B", "A, B and 3 more".
+function list(names) {
+  const most = table.most_names, more = names.length - most;
   return more > 0 ? `${names.slice(0, most).join(", ")} and ${more} more` : names.join(" and ");
 }
 
@@ -49,7 +49,7 @@ const ownerOf = ([kind, owner]) => (kind.includes("joint") || kind.includes("tor
 function conflictText(conflict) {
   const all = conflict.map((one) => (
     `${one[0].replace(/^(upper|lower) /, "")} of the ${ownerOf(one)}`));
-  return `These constraints cannot hold together: ${list([...new Set(all)], MOST_CONFLICTS)}. ` +
+  return `These constraints cannot hold together: ${list([...new Set(all)])}. ` +
     "The robot will be back on its feet in a moment.";
 }
 
@@ -67,7 +67,7 @@ export function conflictLines(conflict) {
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
 // sends. robot: its summary. before: the sentence about the limit just before the robot fell.
-export function limitOf(frame, robot, before = "") {
+function limitOf(frame, robot, before = "") {
   if (frame.outcome) {
     const slipped = frame.hasSlipped ? "The feet slipped. " : "";
     const text = frame.conflict.length ? conflictText(frame.conflict) : STOPPED[frame.outcome];
@@ -95,7 +95,19 @@ export function limitOf(frame, robot, before = "") {
   return {rank: rank + 2, text: `${subject} ${names.length > 1 ? several : one}`};
 }
 
-export const isLimit = ({rank}) => rank > IN_AIR && rank < CALM;
+// Returns a function of each frame that says what limits the robot, or limited it before its fall.
+export function watchLimits(robot) {
+  let before = null; // the last limit
+  return (frame) => {
+    if (frame.time < before?.time) before = null; // the robot is back on its feet
+    const limit = limitOf(frame, robot, before?.text);
+    if (frame.outcome) return limit;
+    const {rank} = limit;
+    if (rank > IN_AIR && rank < CALM) before = {...limit, time: frame.time};
+    else if (frame.time > before?.time + REASON_TIME) before = null;
+    return limit;
+  };
+}
 
 // Sentences that stay long enough to be read, `stays` ms. Of those in the meantime, the most
 // important one is said.
