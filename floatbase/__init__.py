@@ -37,6 +37,7 @@ Examples
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from floatbase.affine import Affine, Quadratic
@@ -86,9 +87,12 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name not in _LAZY:
+        packages = Path(__file__).parent.glob("[a-z]*/__init__.py")
+        homes = [p.parent.name for p in packages if f'"{name}"' in p.read_text(encoding="utf-8")]
+        package, example = (homes[0], name) if homes else ("friction", "FrictionPolyhedron")
         raise AttributeError(
             f"module 'floatbase' has no attribute {name!r}. Import other names from their "
-            f"packages, as in `from floatbase.friction import FrictionPolyhedron`."
+            f"packages, as in `from floatbase.{package} import {example}`."
         )
     value = getattr(import_module(_LAZY[name]), name)
     globals()[name] = value

@@ -81,7 +81,9 @@ def limit_text(record: Rollout, settings: Settings) -> str:
     if not robot.is_floating:
         return "No motor is at a limit."
     wanted = robot.standing().q[2] + settings.com_shift[2]
-    if record.q[-1, 2] < LIMIT_TABLE["low_height"] * wanted:
+    x, y, z = record.q[-1, :3]
+    ground = record.ground.height([x, y]) if record.ground else 0.0
+    if z - ground < LIMIT_TABLE["low_height"] * wanted:
         return str(LIMIT_TABLE["low"])
     return str(LIMIT_TABLE["walks" if settings.gait else "stands"])
 
@@ -133,6 +135,7 @@ def _feet(contacts: Contacts, chosen: np.ndarray) -> list[str]:
 def _subject(names: list[str]) -> str:
     """Return the subject of a sentence, such as "The front left foot"."""
     most = LIMIT_TABLE["most_names"]
-    shown, more = [f"the {name}" for name in names[:most]], len(names) - most
-    text = f"{', '.join(shown)} and {more} more" if more > 0 else " and ".join(shown)
-    return f"T{text[1:]}"
+    shown, more = names[:most], len(names) - most
+    return "The " + (
+        f"{', the '.join(shown)} and {more} more" if more > 0 else " and the ".join(shown)
+    )

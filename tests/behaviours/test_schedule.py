@@ -172,6 +172,7 @@ def test_the_support_margin_is_the_distance_to_the_hull_of_the_feet():
     feet = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0]]  # the third is inside
     assert np.isclose(support_margin([0.5, 1.0], feet), 0.5)
     assert np.isclose(support_margin([3.0, 3.0], feet), -np.sqrt(2.0))
+    assert np.isclose(support_margin([0.0, 1.0], [[-1.0, 0.0], [1.0, 0.0]]), -1.0)  # of a line
     refused(lambda: support_margin([0.0, 0.0], np.zeros((0, 2))), InputError, "feet")
 
 

@@ -1,6 +1,9 @@
 """The sentence that says what limits the robot."""
 
+from dataclasses import replace
+
 import judges
+import numpy as np
 import pytest
 
 import floatbase as fb
@@ -40,3 +43,12 @@ def test_a_robot_in_the_air_is_said_to_be_there():
     push = fb.Push([0.0, 0.0, 2000.0], start=0.0, duration=0.1)
     record = fb.rollout(session.sim, session.controller, 0.152, [push], PERIOD)
     assert "in the air" in limit_text(record, session.settings)
+
+
+def test_a_robot_that_stands_far_down_a_slope_is_not_too_low():
+    settings = Settings(slope=(3.0, 3.0))
+    session, down = Session(GO2, settings), np.deg2rad(3.0)
+    record = fb.rollout(session.sim, session.controller, 0.1, control_period=PERIOD)
+    q = record.q.copy()
+    q[:, [0, 2]] -= 3.0 * np.array([np.cos(down), np.sin(down)])
+    assert "stands" in limit_text(replace(record, q=q), settings)

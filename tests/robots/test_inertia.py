@@ -97,8 +97,4 @@ def test_payloads_that_cannot_be_are_refused():
     robot, arm = judges.load("go2"), judges.load("ur5")
     with pytest.raises(UnknownNameError):
         robot.with_payload("back", 1.0)
-    for make, number in (
-        (lambda: arm.with_payload(arm.base, 1.0), arm.base),
-        (lambda: robot.with_scaled_mass(0.0), "0"),
-    ):
-        refused(make, InputError, number)
+    refused(lambda: arm.with_payload(arm.base, 1.0), InputError, arm.base)

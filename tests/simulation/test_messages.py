@@ -28,7 +28,6 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
     "case",
     [
         (lambda: fb.Simulation(GO2, ground=0.0), "mu", 0),
-        (lambda: fb.Simulation(GO2, timestep=0.0), "timestep", 0),
         (lambda: fb.Ground(normal=[0.0, 0.0, 0.0]), "normal"),
         (lambda: fb.Ground(normal=[UP, [0.0, 0.0, 0.0]]), "normal", 1),
         (lambda: fb.Ground(normal=[UP, UP], offset=[0.1]), "offset", 1, 2),
@@ -38,7 +37,6 @@ def answering(**parts: np.ndarray) -> Callable[..., SimpleNamespace]:
         (lambda: SIM.reset(SOLO.standing()), "go2"),
         (lambda: SIM.step(np.zeros(3)), "torques", 3, 12),
         (lambda: SIM.step("full"), "torques", "full"),
-        (lambda: fb.Push(UP, duration=0.0), "duration", 0),
         (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0015), "control_period", 0.0015,
             "timestep", 0.001),
         (lambda: fb.rollout(SIM, limp, 1.0, control_period=0.0001), "control_period", 0.0001,

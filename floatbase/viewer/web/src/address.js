@@ -5,11 +5,14 @@ import {kindOf, numberOf} from "./controls.js";
 
 const DELAY = 300; // ms: browsers refuse an address that changes too often
 const EXTRAS = ["view", "pushed", "motion"]; // keys that are no controls
+const COMPLETE = 1000; // ms after the last new control, when all are there
 const MOST = 1e4; // of a number of such a key
 const MOST_SHOWN = 40; // characters of a text in a message
 const SWITCHES = new Map([["on", true], ["off", false]]);
 
-export const isKept = (command) => !command.is_hidden && kindOf(command) !== "button";
+// A control that opens another page would open it again when the reader goes back.
+export const isKept = (command) => (
+  !command.is_hidden && !command.opens_page && kindOf(command) !== "button");
 
 // The value of a control as a text, and back; undefined for a text that is no value.
 export function textOf({choices}, value) {
@@ -54,12 +57,23 @@ export function writeHash(entries) {
 export function createAddress(controls, say) {
   const kept = new Map(); // name -> {command, first: text of the first value}
   const refused = new Map(); // name -> sentence
-  let timer = null;
+  let timer = null, completed = null;
   const present = ([name, {command}]) => textOf(command, controls[name].getValue());
   function set(name, text) {
     const {command} = kept.get(name), value = valueOf(command, text);
     if (value === undefined) refused.set(name, refusalOf(command, text));
     else if (text !== present([name, {command}])) controls[name].setValue(value);
+  }
+  // Refuse the keys that are no controls of this page.
+  function checkKeys() {
+    const unknown = [...readHash(location.hash).keys()]
+      .filter((key) => !kept.has(key) && !EXTRAS.includes(key));
+    for (const key of unknown) {
+      const similar = [...kept.keys()].filter((name) => name.startsWith(key));
+      refused.set(key, `There is no control "${key.slice(0, MOST_SHOWN)}" for the address. ` +
+        (similar.length ? `Similar names: ${similar.join(", ")}.` : "It is ignored."));
+    }
+    if (unknown.length) say([...refused.values()].join(" "));
   }
   const moved = () => [...kept].filter((entry) => present(entry) !== entry[1].first)
     .map((entry) => [entry[0], present(entry)]);
@@ -76,6 +90,7 @@ export function createAddress(controls, say) {
     refused.clear();
     for (const [name, {first}] of kept) set(name, wanted.get(name) ?? first);
     if (hadRefused || refused.size > 0) say([...refused.values()].join(" "));
+    checkKeys();
   });
   return {
     // A control is new, or was added again.
@@ -83,6 +98,8 @@ export function createAddress(controls, say) {
       const {name} = command;
       if (!isKept(command) || kept.has(name)) return;
       kept.set(name, {command, first: present([name, {command}])});
+      clearTimeout(completed);
+      completed = setTimeout(checkKeys, COMPLETE);
       const text = readHash(location.hash).get(name);
       if (text === undefined) return;
       set(name, text);

@@ -98,16 +98,17 @@ function placeLabel(label, {renderer, camera}, point) {
   label.style.top = `${Math.max(4, (1 - at.y) / 2 * h - 28)}px`;
 }
 
-const SLIDERS = ["push [N]", "towards [°]", "duration [s]"];
+export const FORCE = "push [N]";
+const SLIDERS = [FORCE, "towards [°]", "duration [s]"];
 
 // Dragging the robot sets the first two sliders, visible or hidden, where a page has them.
 // Elsewhere it turns the view. controls: those of the panel.
 export function sliderDrag(controls) {
   const sliders = () => SLIDERS.map((name) => controls[name]).filter((one) => one);
   return {
-    isWanted: () => sliders().length > 1,
+    isWanted: () => SLIDERS.slice(0, 2).every((name) => controls[name]),
     // Whether a control pushes: the button, or without one the first slider.
-    isPush: (name) => name === (controls.push ? "push" : SLIDERS[0]),
+    isPush: (name) => name === (controls.push ? "push" : FORCE),
     most: () => sliders()[0].getMax(),
     now: () => sliders().map((one) => one.getValue()),
     show({force, towards}) {
@@ -118,7 +119,7 @@ export function sliderDrag(controls) {
       sliders()[1].setValue(push.towards);
       sliders()[0].release(push.force);
     },
-    // Push with these values of the sliders, which keep their own.
+    // Push with these values. If a button pushes, the sliders keep their own.
     push(values) {
       const kept = sliders().map((one) => one.getValue());
       sliders().slice(1).forEach((one, i) => one.setValue(values[i + 1]));

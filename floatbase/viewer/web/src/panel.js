@@ -3,6 +3,7 @@
 
 import {createReports, isUndo, kindOf, rowOf, sliderText} from "./controls.js";
 import {element, make} from "./dom.js";
+import {FORCE} from "./drag.js";
 import {createPlot} from "./plot.js";
 
 const COLUMNS = ["", "model", "reality"];
@@ -80,7 +81,7 @@ export function createPanel(send) {
     // Letting go of "push [N]" presses the button "push".
     const release = (now) => {
       setValue(now);
-      if (Number(now) > 0) controls[name.replace(/ \[.*/, "")]?.fire?.();
+      if (name === FORCE && Number(now) > 0) controls.push?.fire?.();
     };
     input.oninput = () => waits ? show(input.value) : setValue(input.value);
     if (waits) input.onchange = () => release(input.value);

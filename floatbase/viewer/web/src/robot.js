@@ -16,7 +16,7 @@ import {createHint, triesOf} from "./live/hints.js";
 import {createJoystick} from "./live/joystick.js";
 import {createPainter} from "./live/painter.js";
 import {createRecoveryMap} from "./live/recovery_map.js";
-import {conflictLines, createVoice, isLimit, limitOf, multiplierText} from "./live/words.js";
+import {conflictLines, createVoice, multiplierText, watchLimits} from "./live/words.js";
 import {unpack} from "./loader.js";
 import {detachGifWorker, findNode} from "./meshcat.js";
 import {startWhenSeen, watchSight} from "./visibility.js";
@@ -33,7 +33,6 @@ const STANDS_ONLY = "Here this robot only stands. Humanoids walk in the playgrou
 const ROOMY = 1000; // pixels: in a narrower page, the panel is folded until it is wanted
 const PUSHED_AFTER = 1; // s: when the push in an address acts
 const SETTLED = 1000; // ms after a change in which the texts of a paused robot become up to date
-const REASON_TIME = 1; // s before a fall in which a limit may be its reason
 const SLOW = 0.95; // of the wanted speed: with less, the page says how slow it is
 
 export function open(config) {
@@ -100,7 +99,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
   });
   const hasPanel = given.read("panel", choiceRule(["0", "1"])) !== "0";
   let frame = null, isWaiting = false, dragged = null, plotted = -1, written = 0, isPaused = false;
-  let before = null; // what limited the robot last
+  const limitAt = watchLimits(robot);
 
   let gait = null;
   const mostOf = (name) => robot.gaits[name]?.most ?? [0, 0];
@@ -229,12 +228,7 @@ function live(scene, worker, post, {drawing, settings, robot}, {config, given, n
     if (dragged) painter.drawPush(dragged.world, dragged.force);
     else if (acting) painter.drawPush(placeOf(acting), acting.force);
     else painter.drawPush(null, null);
-    const limit = limitOf(frame, robot, before?.text);
-    if (frame.outcome === "") {
-      if (isLimit(limit)) before = {...limit, time: frame.time};
-      else if (frame.time > before?.time + REASON_TIME) before = null;
-    }
-    tell(limit, performance.now());
+    tell(limitAt(frame), performance.now());
     showHint(frame);
     if (frame.time < plotted) plotted = -1;
     if (hasPanel) report();

@@ -33,12 +33,13 @@ test("a text that is no value of the control is refused in words", () => {
   }
 });
 
-test("buttons and hidden sliders are not in the address", () => {
+test("buttons, hidden sliders and links to pages are not in the address", () => {
   const push = {name: "push [N]", value: 1, min: 0, max: 9, on_release: true};
   const term = {name: "g", value: true, term: "g", part: "model"};
   assert.ok([gait, facets, foot, term, push].every(isKept));
   assert.ok(isKept({name: "challenge", value: 0, choices: ["a"], section: ""}));
   assert.ok(!isKept({...push, is_hidden: true}));
+  assert.ok(!isKept({name: "robot", value: 0, choices: ["a", "b"], opens_page: true}));
   assert.ok(!isKept({name: "b", section: "stance"}));
 });
 

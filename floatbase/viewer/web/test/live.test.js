@@ -2,7 +2,6 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import {challenges, createJudge} from "../src/engine/challenges.js";
 import {createClock} from "../src/engine/clock.js";
-import {slippingPoints} from "../src/engine/contacts.js";
 import {createHistory} from "../src/engine/history.js";
 import {
   checkPush, checkSettings, choiceRule, defaults, numberRule, rangeOf, rows, terms,
@@ -15,9 +14,7 @@ import {footText, nearestFacet, polygon} from "../src/live/foot_view.js";
 import {arrowMatrix, coneStatus} from "../src/live/painter.js";
 import {largest} from "../src/engine/recovery.js";
 import {briefly, deal, mapText, outline, ringsFor, wayOf} from "../src/live/recovery_map.js";
-import {
-  conflictLines, createVoice, footName, jointName, limitOf, multiplierText,
-} from "../src/live/words.js";
+import {multiplierText} from "../src/live/words.js";
 
 test("a clock gives the steps of the time that has passed, in slow motion too", () => {
   const clock = createClock(1e-3);
@@ -88,71 +85,10 @@ test("a force is inside its cone, outside, or nothing", () => {
   assert.equal(coneStatus([0, 0, 0.01], 0.7, 0.1), "idle");
 });
 
-const robot = {points: ["FL_foot", "FR_foot"], weight: 100, resting: ["gripper_joint"]};
-const frameWith = (more) => ({
-  outcome: "", conflict: [], seen: [], slipping: [], settings: {actualMu: 0.7}, time: 1,
-  measured: new Float64Array([0, 0, 50, 0, 0, 50]),
-  planned: new Float64Array([0, 0, 50, 0, 0, 50]), ...more,
-});
-
-test("the sentence names what limits the robot, the most important first", () => {
-  const text = (more) => limitOf(frameWith(more), robot).text;
-  assert.match(text({}), /^The robot stands/);
-  assert.match(text({settings: {actualMu: 0.7, gait: "trot"}}), /^The robot walks/);
-  assert.match(text({measured: new Float64Array(6)}), /in the air/);
-  const range = (joint) => ["joint limit", joint, 0, 1];
-  assert.match(text({seen: [range("gripper_joint")]}), /^The robot stands/);
-  const calves = ["FL", "FR", "RL", "RR"].map((leg) => range(`${leg}_calf_joint`));
-  assert.match(text({seen: calves}), /front right calf joint and 2 more are near .* ranges/);
-  const friction = ["friction", "FL_foot", 2, 0.3];
-  assert.match(text({seen: [friction]}), /front left foot is at its friction limit/);
-  const torque = ["upper torque limit", "FL_calf_joint", 0, 0.1];
-  assert.match(text({seen: [friction, torque]}), /front left calf joint is at its torque limit/);
-  const both = [friction, ["friction", "FR_foot", 0, 0.3]];
-  assert.match(text({seen: both}), /left foot and the front right foot are at their friction/);
-  const measured = new Float64Array([0, 0, 50, 0, 34.9, 50]);
-  const planned = new Float64Array([0, 0, 50, 0, 40, 50]);
-  const points = (more) => slippingPoints(frameWith(more), robot);
-  assert.deepEqual(points({measured, planned}), ["FR_foot"]);
-  assert.deepEqual(points({measured}), []); // the planned force is inside
-  assert.match(text({seen: both, slipping: ["FR_foot"]}), /front right foot is slipping/);
-  assert.match(text({outcome: "fell"}), /^The robot fell/);
-  const reason = limitOf(frameWith({outcome: "fell"}), robot, "It slipped.").text;
-  assert.match(reason, /fell.* Just before: It slipped\.$/);
-  assert.doesNotMatch(text({height: 0.6}), /stands/); // it lies on its legs
-  assert.match(text({outcome: "fell", hasSlipped: true}), /^The feet slipped. The robot fell/);
-  const conflict = [["friction", "FL_foot", 0], ["friction", "FL_foot", 3],
-    ["upper torque limit", "RL_calf_joint", 0], ["lower torque limit", "RL_hip_joint", 0]];
-  assert.match(text({outcome: "infeasible", conflict}),
-    /friction of the front left foot, torque limit of the rear left calf joint and 1 more /);
-  assert.match(conflictLines(conflict), /2 × friction: front left foot \(facet 1\), .*facet 4/);
-});
-
-test("parts have names that a reader knows", () => {
-  assert.equal(footName("HR_FOOT"), "rear right foot");
-  assert.equal(footName("left_sole_link corner 1"), "left foot");
-  assert.equal(jointName("RL_thigh_joint"), "rear left thigh joint");
-});
-
 test("the label of a map has few settings", () => {
   assert.equal(briefly("standing, facets 8, CoM x [cm] 2"), "standing, facets 8, CoM x [cm] 2");
   assert.equal(briefly("trot, 0.3 m/s, facets 8, CoM x [cm] 2, CoM y [cm] 1"),
     "trot, 0.3 m/s, facets 8 and 2 more");
-});
-
-test("a sentence stays long enough to be read, unless a more important one follows", () => {
-  const said = [], tell = createVoice((text) => said.push(text), 600);
-  tell({rank: 6, text: "nothing"}, 0);
-  tell({rank: 3, text: "friction"}, 100);
-  tell({rank: 6, text: "nothing"}, 500);
-  assert.deepEqual(said, ["nothing", "friction"]);
-  tell({rank: 5, text: "unloaded"}, 600);
-  tell({rank: 6, text: "nothing"}, 700);
-  assert.deepEqual(said.splice(2), ["unloaded"]); // the most important one of those that waited
-  tell({rank: -2, text: "refused", stays: 5000}, 1400);
-  tell({rank: 0, text: "fell"}, 6300);
-  tell({rank: 6, text: "nothing"}, 6500);
-  assert.deepEqual(said.slice(2), ["refused", "fell"]);
 });
 
 test("a control has its name, its symbol and its unit", () => {

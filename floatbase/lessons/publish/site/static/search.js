@@ -20,8 +20,9 @@ if (typeof Search !== "undefined") {
 
   // the site's spelling
   const parseQuery = Search._parseQuery;
-  Search._parseQuery = (query) => parseQuery(query.replace(/center/gi, "centre")
-    .replace(/(col|behavi)or/gi, "$1our").replace(/(\w{4,}i)s(e[sd]?|ing|ations?)\b/gi, "$1z$2"));
+  Search._parseQuery = (query) => parseQuery(query.replace(/center(?=ed|ing)/gi, "centr")
+    .replace(/center/gi, "centre").replace(/(col|behavi)or/gi, "$1our")
+    .replace(/(\w{4,}(?<![cvw]|pr|ert|prom|prem)i)s(e[sd]?|ing|ations?)\b/gi, "$1z$2"));
 
   const pagesWith = Search.performTermsSearch; // with all words
   const pagesOf = (word) => pagesWith(new Set([word]), new Set());

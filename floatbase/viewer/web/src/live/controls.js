@@ -88,9 +88,8 @@ export function controlsOf(robot, settings, push, {names, name, open, walk, draw
     ranged("towards", "", {value: push.towards}, (value) => { push.towards = value; }),
     ranged("duration", "", {value: push.duration}, (value) => { push.duration = value; }),
     ranged("speed", "", {value: rows.speed.first}, (value) => ({timeScale: value})),
-    control(rows.robot.name, {value: names.indexOf(name), choices: names}, (value) => {
-      open(names[value]);
-    }),
+    control(rows.robot.name, {value: names.indexOf(name), choices: names, opens_page: true},
+      (value) => { open(names[value]); }),
     ...(name === CHALLENGED ? [control(rows.challenge.name,
       {value: 0, choices: ["free play", ...titles]},
       (value) => ({challenge: titles[value - 1] ?? null}))] : []),

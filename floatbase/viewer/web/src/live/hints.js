@@ -15,7 +15,7 @@ const at = (key) => `Open “controls”, then “${rows[key].section}”`;
 export const triesOf = (robot) => [
   ["Pull farther: at which force does it fall?", ({outcome}) => outcome !== ""],
   ["Point at a foot, or tap it. How far is its force from slipping?", ({foot}) => foot !== null],
-  ["Push its nose or its tail. Is it as strong as when its side is pushed?",
+  ["Push it from the front or from behind. Is it as strong as when its side is pushed?",
     ({pushes}) => pushes.some(({force: [x, y]}) => Math.abs(x) > Math.abs(y))],
   [`${at("friction")}: lower the friction of reality only, and push.`,
     ({settings: {mu, actualMu}, pushes}) => actualMu < mu && pushes.length > 0],
@@ -35,13 +35,14 @@ export const triesOf = (robot) => [
 
 // tries: lines after the first push. Returns a function that each picture calls with its frame.
 export function createHint(tries) {
-  const box = element("hint"), line = make("span", {textContent: FIRST});
+  const box = element("hint"), line = make("span", {role: "status", textContent: FIRST});
   const skip = make("button", {
     type: "button", textContent: "›", title: "another idea", ariaLabel: "another idea",
   });
   box.append(line);
   let next = -1, timer = 0;
   function show() {
+    clearTimeout(timer); // the reader may ask for the next line first
     timer = 0;
     line.textContent = tries[++next]?.[0] ?? "";
     if (next === 0) box.append(skip);

@@ -4,8 +4,8 @@ import {isInAir} from "../engine/contacts.js";
 import table from "../../../../live/limits.json" with {type: "json"};
 
 const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
-const MOST_CONFLICTS = 2; // in a sentence
 const IN_AIR = 1; // rank of the sentence about flight, which is no limit
+const REASON_TIME = 1; // s before a fall in which a limit may be its reason
 const CALM = table.limits.length + 2; // rank of a sentence that names no limit
 
 // "FL_foot" -> "front left foot", "left_sole_link corner 1" -> "left foot".
@@ -29,9 +29,9 @@ export function jointName(name) {
     : name.replaceAll("_", " ");
 }
 
-// "A", "A and B", "A, B and 3 more": at most `most` names.
-function list(names, most = table.most_names) {
-  const more = names.length - most;
+// "A", "A and B", "A, B and 3 more".
+function list(names) {
+  const most = table.most_names, more = names.length - most;
   return more > 0 ? `${names.slice(0, most).join(", ")} and ${more} more` : names.join(" and ");
 }
 
@@ -50,7 +50,7 @@ function conflictText(conflict) {
   const all = conflict.map((one) => (
     `${one[0].replace(/^(upper|lower) /, "")} of the ${ownerOf(one)}`));
   return "Feet and motors cannot keep all limits at once: " +
-    `${list([...new Set(all)], MOST_CONFLICTS)} conflict. ` +
+    `${list([...new Set(all)])} conflict. ` +
     "The robot will be back on its feet in a moment.";
 }
 
@@ -68,7 +68,7 @@ export function conflictLines(conflict) {
 
 // What limits the robot: {rank, text}. The least rank is the most important. frame: what the worker
 // sends. robot: its summary. before: the sentence about the limit just before the robot fell.
-export function limitOf(frame, robot, before = "") {
+function limitOf(frame, robot, before = "") {
   if (frame.outcome) {
     const slipped = frame.hasSlipped ? "The feet slipped. " : "";
     const text = frame.conflict.length ? conflictText(frame.conflict) : STOPPED[frame.outcome];
@@ -96,17 +96,29 @@ export function limitOf(frame, robot, before = "") {
   return {rank: rank + 2, text: `${subject} ${names.length > 1 ? several : one}`};
 }
 
-export const isLimit = ({rank}) => rank > IN_AIR && rank < CALM;
+// Returns a function of each frame that says what limits the robot, or limited it before its fall.
+export function watchLimits(robot) {
+  let before = null; // the last limit
+  return (frame) => {
+    if (frame.time < before?.time) before = null; // the robot is back on its feet
+    const limit = limitOf(frame, robot, before?.text);
+    if (frame.outcome) return limit;
+    const {rank} = limit;
+    if (rank > IN_AIR && rank < CALM) before = {...limit, time: frame.time};
+    else if (frame.time > before?.time + REASON_TIME) before = null;
+    return limit;
+  };
+}
 
 // Sentences that stay long enough to be read, `stays` ms, unless a more important one follows. Of
 // those in the meantime, the most important one is said.
 export function createVoice(say, period = 600) {
-  let best = null, next = 0, said = Infinity; // said: the rank
+  let best = null, next = 0, said = {rank: Infinity};
   return ({rank, text, stays = period}, now) => {
     if (best === null || rank < best.rank) best = {rank, text, stays};
-    if (now < next && best.rank >= said) return;
-    say(best.text);
-    said = best.rank;
+    if (now < next && best.rank >= said.rank) return;
+    if (best.text !== said.text) say(best.text);
+    said = best;
     next = now + best.stays;
     best = null;
   };
