@@ -57,6 +57,7 @@ export function writeHash(entries) {
 export function createAddress(controls, say) {
   const kept = new Map(); // name -> {command, first: text of the first value}
   const refused = new Map(); // name -> sentence
+  const opened = readHash(location.hash); // writing the address drops what is not there yet
   let timer = null, completed = null;
   const present = ([name, {command}]) => textOf(command, controls[name].getValue());
   function set(name, text) {
@@ -65,8 +66,8 @@ export function createAddress(controls, say) {
     else if (text !== present([name, {command}])) controls[name].setValue(value);
   }
   // Refuse the keys that are no controls of this page.
-  function checkKeys() {
-    const unknown = [...readHash(location.hash).keys()]
+  function checkKeys(wanted) {
+    const unknown = [...wanted.keys()]
       .filter((key) => !kept.has(key) && !EXTRAS.includes(key));
     for (const key of unknown) {
       const similar = [...kept.keys()].filter((name) => name.startsWith(key));
@@ -90,7 +91,7 @@ export function createAddress(controls, say) {
     refused.clear();
     for (const [name, {first}] of kept) set(name, wanted.get(name) ?? first);
     if (hadRefused || refused.size > 0) say([...refused.values()].join(" "));
-    checkKeys();
+    checkKeys(wanted);
   });
   return {
     // A control is new, or was added again.
@@ -99,8 +100,8 @@ export function createAddress(controls, say) {
       if (!isKept(command) || kept.has(name)) return;
       kept.set(name, {command, first: present([name, {command}])});
       clearTimeout(completed);
-      completed = setTimeout(checkKeys, COMPLETE);
-      const text = readHash(location.hash).get(name);
+      completed = setTimeout(() => checkKeys(opened), COMPLETE);
+      const text = opened.get(name);
       if (text === undefined) return;
       set(name, text);
       if (refused.has(name)) say([...refused.values()].join(" "));

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
-import test from "node:test";
+import test, {mock} from "node:test";
 import {
-  isKept, numbersOf, readHash, refusalOf, textOf, valueOf, writeHash,
+  createAddress, isKept, numbersOf, readHash, refusalOf, textOf, valueOf, writeHash,
 } from "../src/address.js";
 
 const gait = {name: "gait", value: 0, choices: ["stand", "trot"], section: "walking"};
@@ -48,4 +48,27 @@ test("a view or a push in the address is a list of numbers, or nothing", () => {
   for (const text of ["", "1,2", "1,2,3,4", "1,2,x", "1,2,Infinity", "1,2,1e9", "1;2;3", "1,,2"]) {
     assert.equal(numbersOf(text, 3), undefined, text);
   }
+});
+
+test("a key that is no control is refused, and a control that is added late has its value", () => {
+  Object.assign(globalThis, {
+    location: {hash: "#facets=7&gait=trot&gai=hop", pathname: "/", search: ""},
+    history: {replaceState: (_, __, address) => { location.hash = address.slice(1); }},
+    addEventListener() {},
+  });
+  mock.timers.enable({apis: ["setTimeout"]});
+  const values = {facets: 4, gait: 0}, said = [];
+  const controls = Object.fromEntries(Object.keys(values).map((name) => [name, {
+    getValue: () => values[name], setValue: (value) => { values[name] = value; },
+  }]));
+  const address = createAddress(controls, (text) => said.push(text));
+  address.added(facets);
+  address.changed();
+  mock.timers.tick(500); // the address is written
+  address.added(gait);
+  mock.timers.tick(1000);
+  mock.timers.reset();
+  for (const key of ["location", "history", "addEventListener"]) delete globalThis[key];
+  assert.deepEqual(values, {facets: 7, gait: 1});
+  assert.match(said.join(), /no control "gai".*Similar names: gait\./);
 });
