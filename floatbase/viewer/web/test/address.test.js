@@ -53,7 +53,7 @@ test("a view or a push in the address is a list of numbers, or nothing", () => {
 test("a key that is no control is refused, and a control that is added late has its value", () => {
   Object.assign(globalThis, {
     location: {hash: "#facets=7&gait=trot&gai=hop", pathname: "/", search: ""},
-    history: {replaceState: (_, __, address) => { location.hash = address.slice(1); }},
+    history: {replaceState: (_, __, address) => { globalThis.location.hash = address.slice(1); }},
     addEventListener() {},
   });
   mock.timers.enable({apis: ["setTimeout"]});
