@@ -295,7 +295,7 @@ def answer_of(callee, named="", **wrong):
 
 
 def answer(call, named=""):
-    """What is wrong with the answer to a wrong argument, or None. An InputError must say `named`."""
+    """What is wrong with the answer to a wrong argument, or None. An InputError says `named`."""
     with warnings.catch_warnings(action="error"):
         try:
             call()
