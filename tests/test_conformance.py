@@ -283,10 +283,7 @@ def wrongs(callee, name):
 
 
 def answer_of(callee, named="", **wrong):
-    """Return what is wrong with the answer if `wrong` replaces right arguments, or None.
-
-    named: what an InputError must say.
-    """
+    """Return what is wrong with the answer if `wrong` replaces right arguments, or None."""
     right()["Simulation"].reset()
     arguments = rights_of(callee) | wrong
     positional = [
@@ -298,7 +295,7 @@ def answer_of(callee, named="", **wrong):
 
 
 def answer(call, named=""):
-    """What is wrong with the answer to a wrong argument, or None."""
+    """What is wrong with the answer to a wrong argument, or None. An InputError says `named`."""
     with warnings.catch_warnings(action="error"):
         try:
             call()

@@ -211,6 +211,7 @@ SEARCHES = {
     "rnea returns 18 values but I have 12 motors": "Questions",
     "osqp needs many iterations after a warm start": "Questions",
     "center of pressure of each foot": "Questions",
+    "exercise": "06 · Friction cones",
 }
 
 

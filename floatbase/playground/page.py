@@ -134,9 +134,7 @@ class Playground:
         towards: float | None = None,
         duration: float | None = None,
     ) -> None:
-        """Push the robot.
-
-        What is not given is what was set last.
+        """Push the robot, by default with the values that were set last.
 
         Parameters
         ----------

@@ -372,9 +372,8 @@ def test_a_compiled_answer_proves_itself_on_the_reference_problem(robot):
         assert r.dual == 0.0
         assert found.solution.objective == pytest.approx(expected.solution.objective, rel=1e-9)
         assert np.allclose(found.solution["forces"], found.forces)
-        if (
-            robot.name == "go2"
-        ):  # a flat foot's four corners share one wrench: rows can be dependent
+        # a flat foot's four corners share one wrench: rows can be dependent
+        if robot.name == "go2":
             assert set(found.active) == set(expected.active)
             for row, multiplier in expected.multipliers.items():
                 assert found.multipliers[row] == pytest.approx(multiplier, rel=1e-5, abs=1e-7)

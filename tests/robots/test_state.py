@@ -55,9 +55,8 @@ def test_the_centre_of_mass_is_mujocos_and_its_jacobian_and_drift_are_its_deriva
     judge = judges.mujoco_of(robot.name)
     for state in judges.states(robot.name, N):
         judge.move_to(state)
-        if (
-            judge.robot.is_floating
-        ):  # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
+        # MuJoCo counts a fixed base's bolted links in, Pinocchio does not
+        if judge.robot.is_floating:
             assert np.allclose(state.com, judge.data.subtree_com[1], atol=1e-9)
         expected = judges.jacobian_of(lambda s: s.com, state)
         assert np.allclose(state.com_jacobian, expected, atol=1e-7)

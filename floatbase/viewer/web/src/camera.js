@@ -54,7 +54,7 @@ export function followFraction(elapsed) {
 
 // The zoom of a picture of width × height pixels, of which the uppermost `hidden` ones are covered.
 export const zoomFor = (width, height, hidden = 0) =>
-  Math.max(MIN_ZOOM, Math.min(1 - hidden / height, width / height / WIDE));
+  Math.max(MIN_ZOOM, Math.min(1 - hidden / Math.max(1, height), width / height / WIDE));
 
 export const labelScale = (zoom) => Math.min(1 / zoom, MAX_LABEL_SCALE);
 

@@ -43,6 +43,7 @@ test("a picture is smaller in a narrow window, never larger", () => {
   assert.ok(zoomFor(1600, 600, 100) < 1);
   assert.ok(zoomFor(500, 600) < zoomFor(600, 600));
   assert.equal(zoomFor(10, 2000), 0.2);
+  assert.equal(zoomFor(600, 0), 1); // folded
 });
 
 test("labels keep their size on the screen until the picture is very small", () => {

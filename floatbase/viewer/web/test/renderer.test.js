@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import {adaptPixels, isSoftware} from "../src/renderer.js";
 
-test("renderers that draw without a graphics card are recognised by their names", () => {
+test("renderers that draw without a graphics card are recognized by their names", () => {
   for (const name of ["ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)))",
     "llvmpipe (LLVM 17.0.6, 256 bits)", "softpipe", "Apple Software Renderer",
     "ANGLE (Microsoft, Microsoft Basic Render Driver Direct3D11)"]) assert.ok(isSoftware(name));

@@ -16,7 +16,7 @@ import {
   Refusal, SWITCH, check, checkNames, choiceRule, defaults, liftedFeet, numberRule,
 } from "./settings.js";
 
-const WARM_UP = 800; // steps, after which a browser has optimised the code
+const WARM_UP = 800; // steps, after which a browser has optimized the code
 let mj = null, module = null, robot = null, engine = null;
 let resting = []; // joints that are at the end of their range when the robot stands
 let around = null; // names of the contact points, and the weight

@@ -3,6 +3,7 @@
 
 import {element, make} from "../dom.js";
 import {rows} from "../engine/settings.js";
+import {WEAK} from "./words.js";
 
 const WATCHED = 4000; // ms in which the effect of what was done is watched
 const FIRST = "Drag the robot";
@@ -28,7 +29,8 @@ export const triesOf = (robot) => [
   ["Press “model” below “+ g” at the top: the robot no longer knows its weight, and sags.",
     ({settings}) => settings.assumedOff.includes("gravity")],
   [`${at("torque_limits")}: lower the torque limits until a motor is named above.`,
-    ({seen}) => seen.some(([kind, , , multiplier]) => kind.endsWith("torque limit") && multiplier)],
+    ({seen}) => seen.some(([kind, , , multiplier]) => (
+      kind.endsWith("torque limit") && multiplier > WEAK))],
   [`${at("gravity")}: set gravity to 1.6 m/s², as on the Moon, and push again.`,
     ({settings, pushes}) => settings.gravity < MOON && pushes.length > 0],
 ];

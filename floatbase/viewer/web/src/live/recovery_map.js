@@ -63,7 +63,7 @@ export function mapText(found, what, seconds) {
   const [weak, strong] = [sorted[0], sorted.at(-1)].map(
     ({push, direction}) => `${push} N (${wayOf(direction)})`,
   );
-  const range = sorted[0].push === sorted.at(-1).push ? `${sorted[0].push} N in all of them`
+  const range = sorted[0].push === sorted.at(-1).push ? `${sorted[0].push} N in each direction`
     : `from ${weak} to ${strong}`;
   return `Largest push of ${DURATION} s that the robot survives (${what}): ${range}, ${state}.`;
 }

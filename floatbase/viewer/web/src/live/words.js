@@ -3,7 +3,7 @@
 import {isInAir} from "../engine/contacts.js";
 import table from "../../../../live/limits.json" with {type: "json"};
 
-const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
+export const WEAK = 1e-4; // a multiplier: a smaller one hardly changes the motion
 const IN_AIR = 1; // rank of the sentence about flight, which is no limit
 const REASON_TIME = 1; // s before a fall in which a limit may be its reason
 const CALM = table.limits.length + 2; // rank of a sentence that names no limit
