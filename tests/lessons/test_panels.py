@@ -165,10 +165,10 @@ def panel():
 )
 def test_a_push_has_the_direction_of_the_handle(panel, force, towards, way, words):
     panel.towards.value = towards
+    start = time.monotonic()
     panel.force.value = force
     assert panel.line.value == words and panel.run.status == "running"
     until(lambda: panel.arrow is not None)
-    start = time.monotonic()
     np.testing.assert_allclose(
         panel.arrow, panel.view.scale * abs(force) * np.array(way), atol=1e-9
     )
