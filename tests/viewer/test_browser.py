@@ -94,6 +94,7 @@ def test_controls_have_any_name_and_the_same_values_in_every_page(page, browser,
     for one in (page, other):
         one.wait_for_function(f"{now} == '{present}'")
         assert one.evaluate("window.hit") is None
+    page.wait_for_function("location.hash.includes('0.5')")
     page.reload()
     page.wait_for_function(f"window.viewer && {now} == '{present}'")
     # made again, as a cell that is run again does

@@ -58,6 +58,7 @@ export function createAddress(controls, say) {
   const kept = new Map(); // name -> {command, first: text of the first value}
   const refused = new Map(); // name -> sentence
   const opened = readHash(location.hash); // writing the address drops what is not there yet
+  const waiting = new Map(); // name -> text of a new control
   let timer = null, completed = null;
   const present = ([name, {command}]) => textOf(command, controls[name].getValue());
   function set(name, text) {
@@ -94,17 +95,22 @@ export function createAddress(controls, say) {
     checkKeys(wanted);
   });
   return {
-    // A control is new, or was added again.
+    // A control is new, or was added again. Its value follows with `apply`, because the window may
+    // send the present one first.
     added(command) {
       const {name} = command;
       if (!isKept(command) || kept.has(name)) return;
       kept.set(name, {command, first: present([name, {command}])});
       clearTimeout(completed);
       completed = setTimeout(() => checkKeys(opened), COMPLETE);
-      const text = opened.get(name);
-      if (text === undefined) return;
-      set(name, text);
-      if (refused.has(name)) say([...refused.values()].join(" "));
+      if (opened.has(name)) waiting.set(name, opened.get(name));
+    },
+    apply() {
+      for (const [name, text] of waiting) {
+        set(name, text);
+        if (refused.has(name)) say([...refused.values()].join(" "));
+      }
+      waiting.clear();
     },
     changed() { timer ??= setTimeout(write, DELAY); },
     // The part after # that another robot understands: without the top of the panel and the view.

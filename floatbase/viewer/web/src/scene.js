@@ -95,6 +95,7 @@ export function createScene(config) {
           console.error("floatbase: a drawing command failed", error);
         }
       }
+      address?.apply();
       viewer.num_messages_received++;
     },
     address,
@@ -111,7 +112,10 @@ export function createScene(config) {
       const values = address.numbers("pushed", sliders.now().length);
       if (values) setTimeout(() => sliders.push(values), PUSHED_AFTER);
     },
-    handle: (command) => viewer.handle_command(command),
+    handle(command) {
+      viewer.handle_command(command);
+      address?.apply();
+    },
     fit: () => viewer.set_3d_pane_size(),
     // a PNG as a data URL
     capture: () => viewer.capture_image(),

@@ -63,9 +63,13 @@ test("a key that is no control is refused, and a control that is added late has 
   }]));
   const address = createAddress(controls, (text) => said.push(text));
   address.added(facets);
+  address.apply();
   address.changed();
   mock.timers.tick(500); // the address is written
   address.added(gait);
+  values.gait = 1; // the window has this value already
+  controls.gait.setValue = () => assert.fail("the window would hear the value again");
+  address.apply();
   mock.timers.tick(1000);
   mock.timers.reset();
   for (const key of ["location", "history", "addEventListener"]) delete globalThis[key];
