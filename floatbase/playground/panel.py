@@ -132,13 +132,18 @@ class Panel:
 
     def _add_challenges(self) -> None:
         """Add the menu of challenges, if the robot has any."""
-        if self._playground.robot.name in {challenge.robot for challenge in CHALLENGES}:
+        if self._has_challenges:
             titles = [_FREE_PLAY, *(challenge.title for challenge in CHALLENGES)]
             self._playground.view.add_dropdown(
                 _CHALLENGE.label,
                 lambda i: self._playground.start_challenge(CHALLENGES[i - 1] if i else None),
                 titles,
             )
+
+    @property
+    def _has_challenges(self) -> bool:
+        """Whether the panel has a menu of challenges."""
+        return self._playground.robot.name in {challenge.robot for challenge in CHALLENGES}
 
     def _add_terms(self) -> None:
         """Add the switches and legend entries of the terms of eq. (7)."""
@@ -236,6 +241,9 @@ class Panel:
             sliders += _STEP_SLIDERS
             values[_GAIT.label] = self._gait_number(settings)
         values |= {slider.name: slider.shown(settings) for slider in sliders}
+        if self._has_challenges:
+            started = [each is self._playground.challenge for each in CHALLENGES]
+            values[_CHALLENGE.label] = 1 + started.index(True) if any(started) else 0
         for foot in self._playground.robot.feet:
             values[_lift_name(foot)] = foot.frame in settings.lifted_feet
         for term in EQUATION:
