@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -42,6 +43,21 @@ def one_blas_thread() -> Iterator[None]:
         yield
     finally:
         with _lock:
-            _inside -= 1
+            _inside = max(_inside - 1, 0)
             if _inside == 0:
                 set_threads(_outside)
+
+
+def _after_fork() -> None:
+    """In a forked process, forget the other threads, which do not exist there."""
+    global _inside
+    if _inside and SETTER is not None:
+        getattr(LIBRARY, SETTER)(_outside)
+    _inside = 0
+    _lock.release()
+
+
+if hasattr(os, "register_at_fork"):  # no thread may hold the lock while the process is forked
+    os.register_at_fork(
+        before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_after_fork
+    )
