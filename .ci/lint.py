@@ -342,7 +342,7 @@ def _numbers(ranges: str) -> set[str]:
 
 # largest numbers of lines without docstrings, blank lines and comments; and of all docstrings
 BUDGETS = {
-    "library": 17060, "lessons": 12000, "viewer": 4200, "tests": 23652, "benchmarks": 2345,
+    "library": 17069, "lessons": 12000, "viewer": 4200, "tests": 23652, "benchmarks": 2345,
     "docstrings": 16081,
 }  # fmt: skip
 
