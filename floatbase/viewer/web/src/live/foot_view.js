@@ -29,8 +29,9 @@ export function footText(facets, planned, worth, least) {
   if (planned[2] < least) return "The controller plans no force here: no edge to reach.";
   const {distance, facet} = nearestFacet(facets, planned);
   if (worth === null) {
-    return `Planned: ${distance.toFixed(1)} N inside the nearest edge (facet ${facet + 1}), ` +
-      "beyond which the foot slips. More friction here would change nothing.";
+    return `Planned: ${distance.toFixed(1)} N inside the nearest edge (facet ${facet + 1}). ` +
+      "Beyond the edge, the controller expects the foot to slip. More friction here would change " +
+      "nothing.";
   }
   const gain = worth.now - worth.then;
   const motion = gain > 0.005

@@ -26,7 +26,7 @@ export const triesOf = (robot) => [
   ...(robot.lifted.length ? [[
     `${at("lift")}: lift a foot. The robot moves its mass over the others first.`,
     ({settings}) => settings.lifted !== null]] : []),
-  ["Press “model” below “+ g” at the top: the robot no longer knows its weight, and sags.",
+  ["Press “model” below “+ g” at the top: the controller ignores the weight, and the robot sags.",
     ({settings}) => settings.assumedOff.includes("gravity")],
   [`${at("torque_limits")}: lower the torque limits until a motor is named above.`,
     ({seen}) => seen.some(([kind, , , multiplier]) => (
